@@ -1,4 +1,4 @@
-"""Fixtures that read messages as the log of a real robot; tests of this folder also share `moments.py` and others."""
+"""Fixtures that read messages like the log of a real robot. Makes the helper modules of this folder importable."""
 
 import sys
 from collections.abc import Callable

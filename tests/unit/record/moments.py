@@ -1,4 +1,4 @@
-"""Synthetic run with everything that a log can contain."""
+"""Synthetic run with all kinds of data that a log can contain."""
 
 from collections.abc import Iterator
 
@@ -77,7 +77,9 @@ def moments(
             readings.append(Bump("bumper", tick, tick % 240 == 0))
             rgb = rng.integers(0, 256, size=(3, 4, 3), dtype=np.uint8)
             readings.append(Image("camera", tick, rgb, np.full((3, 4), np.inf, dtype=np.float32)))
-        happened = [Event(tick, "collision.started", "wall", {"x": x, "y": 1 / 3, "impulse": 1e-300})] * (tick == 240)
+        world_events = [Event(tick, "collision.started", "wall", {"x": x, "y": 1 / 3, "impulse": 1e-300})] * (
+            tick == 240
+        )
         stack_events = [Event(tick, "goal.accepted", "shelf", {"index": 0, "list": [1, 2.5, None, True]})] * (tick == 0)
         cart = Pose3(x, y, 0.1, 0.0, 0.0, np.sin(yaw), np.cos(yaw)) if tick > 120 else Pose3(1.0)
         truth = Truth(
@@ -88,5 +90,5 @@ def moments(
         )
         decision = Decision(command, belief, plan, local_plan, tuple(stack_events))
         yield Moment(
-            tick, truth if tick % 12 == 0 or tick % 6 == 0 else None, tuple(readings), decision, tuple(happened)
+            tick, truth if tick % 12 == 0 or tick % 6 == 0 else None, tuple(readings), decision, tuple(world_events)
         )

@@ -1,7 +1,7 @@
 """Regenerate simscen/record/schemas.json: `python tests/unit/record/schemas_from_rosbags.py`.
 
-The texts and hashes are those of ROS 2 Humble as rosbags knows them, so that running simscen needs neither ROS nor
-rosbags.
+rosbags contains the message definitions and hashes of ROS 2 Humble. With schemas.json, simscen itself needs neither
+ROS nor rosbags.
 """
 
 import json
@@ -48,7 +48,7 @@ def humble() -> Typestore:
     return store
 
 
-def expected() -> dict[str, dict[str, str]]:
+def expected_schemas() -> dict[str, dict[str, str]]:
     """Return the expected content of schemas.json."""
     store = humble()
     return {
@@ -58,4 +58,4 @@ def expected() -> dict[str, dict[str, str]]:
 
 
 if __name__ == "__main__":
-    SCHEMAS.write_text(json.dumps(expected(), indent=1) + "\n")
+    SCHEMAS.write_text(json.dumps(expected_schemas(), indent=1) + "\n")

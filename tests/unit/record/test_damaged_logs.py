@@ -1,4 +1,4 @@
-"""Tests of damaged logs: they are read partly or refused with InvalidInput."""
+"""Tests that damaged logs are read in part, or refused with InvalidInput."""
 
 import os
 import signal
@@ -28,7 +28,7 @@ from simscen.record.trace_builder import TraceBuilder
 HERE = Path(__file__).parent
 
 
-def recorded(path: Path, seconds: float) -> Trace:
+def write_log(path: Path, seconds: float) -> Trace:
     """Write a complete log, and return the trace of its moments."""
     builder, end = TraceBuilder(CLOCK), CLOCK.ticks(seconds)
     with Recorder(path, CLOCK, sample_header()) as recorder:
@@ -42,12 +42,12 @@ def recorded(path: Path, seconds: float) -> Trace:
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("log") / "run.mcap"
-    recorded(path, 1.0)
+    write_log(path, 1.0)
     return path
 
 
-def killed(folder: Path, seconds: float) -> Path:
-    """Return the log of a process killed by SIGKILL after this simulated time."""
+def log_of_killed_process(folder: Path, seconds: float) -> Path:
+    """Return the log of a process that is killed by SIGKILL after `seconds` of simulated time."""
     code = f"""if True:
         import os, signal, sys
         sys.path.insert(0, {str(HERE)!r})
@@ -66,8 +66,8 @@ def killed(folder: Path, seconds: float) -> Path:
 
 
 def test_a_killed_log_keeps_95_percent_of_its_messages(tmp_path: Path) -> None:
-    partial = killed(tmp_path, 20.0)
-    whole = recorded(tmp_path / "whole.mcap", 20.0)
+    partial = log_of_killed_process(tmp_path, 20.0)
+    whole = write_log(tmp_path / "whole.mcap", 20.0)
     log = read_log(partial)
     assert not log.complete
     assert log.header.case == CASE
@@ -78,13 +78,14 @@ def test_a_killed_log_keeps_95_percent_of_its_messages(tmp_path: Path) -> None:
 
 def test_the_mcap_library_streams_a_killed_log(tmp_path: Path) -> None:
     count = 0
-    with killed(tmp_path, 5.0).open("rb") as stream, pytest.raises(EndOfFile):
+    with log_of_killed_process(tmp_path, 5.0).open("rb") as stream, pytest.raises(EndOfFile):
         for record in StreamReader(stream).records:
             count += isinstance(record, Message)
     assert count > 1000
 
 
 def problem(path: Path) -> str:
+    """Return code and message of the error with which the log is refused."""
     with pytest.raises(InvalidInput) as caught:
         read_log(path)
     (found,) = caught.value.problems
@@ -117,7 +118,7 @@ def test_concatenated_logs_are_refused(tmp_path: Path, log: Path) -> None:
     assert problem(path) == message
 
 
-def chunked(path: Path, compression: CompressionType, data: bytes) -> Path:
+def write_chunked_log(path: Path, compression: CompressionType, data: bytes) -> Path:
     """Write a log with one chunk that contains one message."""
     with path.open("wb") as stream:
         writer = Writer(stream, compression=compression)
@@ -130,7 +131,7 @@ def chunked(path: Path, compression: CompressionType, data: bytes) -> Path:
 
 @pytest.mark.parametrize("compression", CompressionType)
 def test_chunks_are_read_up_to_a_limit(tmp_path: Path, monkeypatch, compression: CompressionType) -> None:
-    path = chunked(tmp_path / "run.mcap", compression, bytes(10_000))
+    path = write_chunked_log(tmp_path / "run.mcap", compression, bytes(10_000))
     monkeypatch.setattr(mcap_reader, "MAX_RECORD_BYTES", 20_000)
     with path.open("rb") as stream:
         (message,) = [record for record in RecordReader(stream) if isinstance(record, Message)]
@@ -156,22 +157,24 @@ def test_log_of_another_recorder_is_reported(tmp_path: Path) -> None:
 
 
 @settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(place=st.floats(0, 1), bit=st.integers(0, 7))
-def test_flipped_bit_is_detected(tmp_path: Path, log: Path, place: float, bit: int) -> None:
+@given(position=st.floats(0, 1), bit=st.integers(0, 7))
+def test_flipped_bit_is_detected(tmp_path: Path, log: Path, position: float, bit: int) -> None:
     data = bytearray(log.read_bytes())
-    (summary,) = struct.unpack_from("<Q", data, len(data) - 28)  # the index after it is not read
-    data[int(place * (summary - 1))] ^= 1 << bit
+    (summary,) = struct.unpack_from(
+        "<Q", data, len(data) - 28
+    )  # simscen does not read the index, which follows the summary
+    data[int(position * (summary - 1))] ^= 1 << bit
     path = tmp_path / "flipped.mcap"
     path.write_bytes(data)
     assert problem(path)
 
 
 @settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
-@given(kept=st.floats(0, 1))
-def test_truncated_log_is_read_up_to_its_end_or_refused(tmp_path: Path, log: Path, kept: float) -> None:
+@given(kept_fraction=st.floats(0, 1))
+def test_truncated_log_is_read_up_to_its_end_or_refused(tmp_path: Path, log: Path, kept_fraction: float) -> None:
     data = log.read_bytes()
     path = tmp_path / "cut.partial.mcap"
-    path.write_bytes(data[: int(kept * len(data))])
+    path.write_bytes(data[: int(kept_fraction * len(data))])
     try:
         read: Log | None = read_log(path)
     except InvalidInput:

@@ -1,4 +1,4 @@
-"""Tests that edited logs never pass."""
+"""Tests that a log from which data was removed does not pass, and that an inconsistent log is refused."""
 
 import re
 import struct
@@ -50,16 +50,25 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def edited(log: Path, path: Path, keep: Keep = lambda *_: True, counts: bool = True, backwards: bool = False) -> Path:
-    """Write a copy with the mcap library that contains only the messages to keep (by topic and seconds)."""
+def write_edited_copy(
+    log: Path, path: Path, keep: Keep = lambda *_: True, counts: bool = True, backwards: bool = False
+) -> Path:
+    """Write a copy of the log with the mcap library.
+
+    It contains only the messages for which `keep(topic, time in s)` is true. `counts`: with the message counts at
+    its end; `backwards`: with the messages in reverse order.
+    """
     with log.open("rb") as source, path.open("wb") as target:
         reader, writer = make_reader(source), Writer(target)
         summary = reader.get_summary()
         assert summary is not None
         writer.start("ros2", "other recorder")
-        schemas = {one.id: writer.register_schema(one.name, one.encoding, one.data) for one in summary.schemas.values()}
-        notes = list(reader.iter_metadata())
-        (run_record,) = [note for note in notes if note.name == "simscen"]
+        schemas = {
+            schema.id: writer.register_schema(schema.name, schema.encoding, schema.data)
+            for schema in summary.schemas.values()
+        }
+        metadata = list(reader.iter_metadata())
+        (run_record,) = [record for record in metadata if record.name == "simscen"]
         writer.add_metadata(run_record.name, run_record.metadata)
         for file in reader.iter_attachments():
             writer.add_attachment(0, 0, file.name, file.media_type, file.data)
@@ -72,7 +81,7 @@ def edited(log: Path, path: Path, keep: Keep = lambda *_: True, counts: bool = T
                     kind = schemas[channel.schema_id]
                     channels[channel.topic] = writer.register_channel(channel.topic, "cdr", kind)
                 writer.add_message(channels[channel.topic], message.log_time, message.data, message.log_time)
-        (end,) = [note for note in notes if note.name == "simscen.end"]
+        (end,) = [record for record in metadata if record.name == "simscen.end"]
         writer.add_metadata(end.name, end.metadata if counts else {"tick": end.metadata["tick"]})
         writer.finish()
     return path
@@ -83,15 +92,15 @@ def _messages(reader) -> Iterator[tuple[records.Channel, records.Message]]:
         yield channel, message
 
 
-def judged(read: Log):
-    entries = [AnyCriterion.model_validate(words) for words in CRITERIA]
+def judge_log(read: Log):
+    entries = [AnyCriterion.model_validate(criterion) for criterion in CRITERIA]
     return judge_run(RunKey("a", 7), "a", entries, read.trace, read.header.case, coverage=read.coverage)
 
 
 def test_copied_log_passes(log: Path, tmp_path: Path) -> None:
-    for read in (read_log(log), read_log(edited(log, tmp_path / "copy.mcap"))):
+    for read in (read_log(log), read_log(write_edited_copy(log, tmp_path / "copy.mcap"))):
         assert not read.coverage.missing and not read.coverage.partial
-        assert judged(read).outcome is Outcome.PASSED
+        assert judge_log(read).outcome is Outcome.PASSED
 
 
 EDITS: dict[str, tuple[Keep, set[str]]] = {
@@ -107,8 +116,8 @@ EDITS: dict[str, tuple[Keep, set[str]]] = {
 @pytest.mark.parametrize("edit", EDITS)
 def test_edited_log_does_not_pass_without_its_evidence(log: Path, tmp_path: Path, edit: str) -> None:
     keep, affected = EDITS[edit]
-    read = read_log(edited(log, tmp_path / "edited.mcap", keep))
-    result = judged(read)
+    read = read_log(write_edited_copy(log, tmp_path / "edited.mcap", keep))
+    result = judge_log(read)
     statuses = {verdict.id: verdict.status for verdict in result.verdicts}
     assert {name for name, status in statuses.items() if status is Status.INCONCLUSIVE} == affected
     assert result.outcome is Outcome.FAILED
@@ -117,20 +126,20 @@ def test_edited_log_does_not_pass_without_its_evidence(log: Path, tmp_path: Path
 
 
 def test_log_without_message_counts_does_not_pass(log: Path, tmp_path: Path) -> None:
-    read = read_log(edited(log, tmp_path / "edited.mcap", counts=False))
+    read = read_log(write_edited_copy(log, tmp_path / "edited.mcap", counts=False))
     assert set(read.coverage.partial) == set(Evidence)
-    assert {verdict.status for verdict in judged(read).verdicts} == {Status.INCONCLUSIVE}
+    assert {verdict.status for verdict in judge_log(read).verdicts} == {Status.INCONCLUSIVE}
 
 
 def test_log_without_ground_truth_is_refused_with_the_removed_topic(log: Path, tmp_path: Path) -> None:
-    path = edited(log, tmp_path / "edited.mcap", lambda topic, _: topic != TRUTH)
+    path = write_edited_copy(log, tmp_path / "edited.mcap", lambda topic, _: topic != TRUTH)
     with pytest.raises(InvalidInput, match=f"no ground truth: the messages of {TRUTH} were removed"):
         read_run(path)
 
 
 def test_messages_in_reverse_order_are_refused(log: Path, tmp_path: Path) -> None:
     with pytest.raises(InvalidInput, match="not in the order of time"):
-        read_log(edited(log, tmp_path / "edited.mcap", backwards=True))
+        read_log(write_edited_copy(log, tmp_path / "edited.mcap", backwards=True))
 
 
 Record = dict[str, str]
@@ -147,7 +156,7 @@ class Parts:
                 [schema, channel.topic, message.log_time, message.data]
                 for schema, channel, message in reader.iter_messages(log_time_order=False)
             ]
-            self.metadata = [(note.name, dict(note.metadata)) for note in reader.iter_metadata()]
+            self.metadata = [(record.name, dict(record.metadata)) for record in reader.iter_metadata()]
             self.attachments = [(file.name, file.data) for file in reader.iter_attachments()]
 
     def record(self, name: str) -> Record:
@@ -159,7 +168,7 @@ class Parts:
         return [message for message in self.messages if message[1] == topic]
 
     def write(self, path: Path, channels_per_topic: int = 1) -> Path:
-        """Write a log, with the messages of each topic spread over several channels in turn."""
+        """Write a log. The messages of each topic alternate between its channels."""
         with path.open("wb") as target:
             writer = Writer(target)
             writer.start("ros2", "other recorder")
@@ -180,7 +189,7 @@ class Parts:
 
 def test_message_counts_are_summed_over_channels_of_a_topic(log: Path, tmp_path: Path) -> None:
     read = read_log(Parts(log).write(tmp_path / "split.mcap", channels_per_topic=3))
-    assert judged(read).outcome is Outcome.PASSED
+    assert judge_log(read).outcome is Outcome.PASSED
 
 
 def halve_times(parts: Parts) -> None:
@@ -236,7 +245,7 @@ def test_inconsistent_log_is_refused(log: Path, tmp_path: Path, edit: str) -> No
         read_log(parts.write(tmp_path / "edited.mcap"))
 
 
-def described(robots: str) -> LogContents:
+def contents_with_robots(robots: str) -> LogContents:
     """Return the contents of a log with this list of robots, and the cases of robots a and b."""
     contents = LogContents()
     contents.add(records.Metadata("simscen", run_record("a", robots)))
@@ -251,12 +260,12 @@ def run_record(name: str, robots: str) -> Record:
 
 
 def test_all_robots_of_a_log_are_listed() -> None:
-    assert list(described('["a", "b"]').header().robots) == ["a", "b"]
+    assert list(contents_with_robots('["a", "b"]').header().robots) == ["a", "b"]
     with pytest.raises(ValueError, match=r"it has b/case\.json, but its list of robots is a$"):
-        described('["a"]').header()
+        contents_with_robots('["a"]').header()
 
 
 @pytest.mark.parametrize("robots", ['["a", "a"]', '{"a": 1}', '"a"', "[[]]", "[1, 2]"])
 def test_duplicate_robot_names_are_refused(robots: str) -> None:
     with pytest.raises(ValueError, match="its list of robots is"):
-        described(robots)
+        contents_with_robots(robots)

@@ -87,8 +87,8 @@ def test_transform_between_two_frames_can_be_the_ground_truth(read: Callable[...
     for k in range(201):
         stamp = BEGIN + k * SECOND // 20
         messages.append(Message("/tf", stamp, link(stamp, "odom", "base_link", SPEED * k / 20)))
-    for at, offset in ((BEGIN, 1.0), (BEGIN + 5 * SECOND, 2.0)):
-        messages.append(Message("/tf", at, link(at, "map", "odom", 0.0, offset, 1.5707963)))
+    for time, offset in ((BEGIN, 1.0), (BEGIN + 5 * SECOND, 2.0)):
+        messages.append(Message("/tf", time, link(time, "map", "odom", 0.0, offset, 1.5707963)))
     messages.append(Message("/tf_static", BEGIN, link(0, "/base_link", "/marker", 0.25)))
     trace = read(messages, ForeignLogOptions(truth="map:marker")).trace
     x, y, yaw = trace.truth.values.T
@@ -96,8 +96,8 @@ def test_transform_between_two_frames_can_be_the_ground_truth(read: Callable[...
     offset = np.where(trace.truth.ticks < 5000, 1.0, 2.0)
     np.testing.assert_allclose(y, offset + 0.25 + SPEED * trace.truth.ticks / 1000, atol=2e-3)
     np.testing.assert_allclose(yaw, np.pi / 2, atol=1e-6)
-    lost = read(messages, ForeignLogOptions(truth="map:wheel")).coverage.missing[Evidence.TRUTH]
-    assert lost == "tf does not connect map with wheel; frames: base_link, map, marker, odom"
+    missing = read(messages, ForeignLogOptions(truth="map:wheel")).coverage.missing[Evidence.TRUTH]
+    assert missing == "tf does not connect map with wheel; frames: base_link, map, marker, odom"
     reversed_frames = read(messages, ForeignLogOptions(truth="marker:map")).coverage.missing[Evidence.TRUTH]
     assert reversed_frames == "in tf, marker is below map; write map:marker"
 
@@ -122,27 +122,29 @@ def test_ground_truth_in_another_frame_is_not_compared_with_the_map(read: Callab
 
 
 def test_gap_in_the_ground_truth_is_partial_coverage(read: Callable[..., ForeignLog]) -> None:
-    gone = (BEGIN + 4 * SECOND, BEGIN + 6 * SECOND)
-    log = read([one for one in drive() if one.topic != "/mocap" or not gone[0] < one.time < gone[1]])
+    gap = (BEGIN + 4 * SECOND, BEGIN + 6 * SECOND)
+    log = read([entry for entry in drive() if entry.topic != "/mocap" or not gap[0] < entry.time < gap[1]])
     assert log.coverage.partial[Evidence.TRUTH].startswith("/mocap has no message from t = 3.9")
-    late = read([one for one in drive() if one.topic != "/mocap" or one.time > gone[1]])
+    late = read([entry for entry in drive() if entry.topic != "/mocap" or entry.time > gap[1]])
     assert late.coverage.partial[Evidence.TRUTH].startswith("/mocap has no message from t = 0.00 s to 6.0")
 
 
 def test_an_age_of_scans_that_no_sample_of_the_ground_truth_shows_is_partial_coverage(
     read: Callable[..., ForeignLog],
 ) -> None:
-    """Without any message for 0.9 s, the age of a scan is never seen above 0.5 s."""
-    gone = (BEGIN + 4.03 * SECOND, BEGIN + 4.99 * SECOND)
-    log = read([one for one in drive() if not gone[0] < one.time < gone[1]])
+    """Without any message for 0.9 s, no sample of the ground truth has a scan that is older than 0.5 s."""
+    gap = (BEGIN + 4.03 * SECOND, BEGIN + 4.99 * SECOND)
+    log = read([entry for entry in drive() if not gap[0] < entry.time < gap[1]])
     assert list(log.coverage.partial) == [Evidence.SCANS]
     assert "no scan from t = 4.00 s to 5.00 s" in log.coverage.partial[Evidence.SCANS]
-    seen = read([one for one in drive() if one.topic != "/scan" or not gone[0] < one.time < gone[1]])
-    assert not seen.coverage.partial
+    without_scans_only = read(
+        [entry for entry in drive() if entry.topic != "/scan" or not gap[0] < entry.time < gap[1]]
+    )
+    assert not without_scans_only.coverage.partial
 
 
 def test_belief_that_starts_after_a_meter_is_partial_coverage(read: Callable[..., ForeignLog]) -> None:
-    log = read([one for one in drive() if one.topic != "/amcl_pose" or one.time > BEGIN + 2 * SECOND])
+    log = read([entry for entry in drive() if entry.topic != "/amcl_pose" or entry.time > BEGIN + 2 * SECOND])
     assert log.coverage.partial[Evidence.BELIEF].startswith("/amcl_pose starts at t = 2.0")
 
 
@@ -157,15 +159,15 @@ def test_velocity_is_computed_from_poses_if_all_twists_are_zero(read: Callable[.
 
 
 def test_velocities_beside_a_gap_are_not_averaged_over_the_gap() -> None:
-    """A robot drives 1 m/s along an arc, and brakes with 1 m/s² in a gap, as if seen 50 times per second."""
+    """A robot drives along an arc at 1 m/s, and brakes at 1 m/s² in a gap of the poses, which are at 50 Hz."""
     times = np.delete(np.arange(0, 4001, 20), slice(100, 145))
     speed = 1 - np.clip(times / 1000 - 2.0, 0.0, 1.0)
     path = np.where(times <= 2000, times / 1000, 2.0 + (1 - speed**2) / 2)
     poses = np.column_stack((np.sin(path), 1 - np.cos(path), path))
-    found = velocity_from_poses(times, poses, 1000)
-    still, driving = times >= 3000, times <= 2000
-    np.testing.assert_allclose(found[driving], np.tile([1.0, 0.0, 1.0], (driving.sum(), 1)), atol=0.06)
-    np.testing.assert_allclose(found[still], 0.0, atol=0.03)
+    velocities = velocity_from_poses(times, poses, 1000)
+    is_standing, is_driving = times >= 3000, times <= 2000
+    np.testing.assert_allclose(velocities[is_driving], np.tile([1.0, 0.0, 1.0], (is_driving.sum(), 1)), atol=0.06)
+    np.testing.assert_allclose(velocities[is_standing], 0.0, atol=0.03)
 
 
 def test_a_robot_that_is_faster_in_a_gap_does_not_seem_slower() -> None:
@@ -177,8 +179,8 @@ def test_a_robot_that_is_faster_in_a_gap_does_not_seem_slower() -> None:
 def test_velocities_of_rare_and_single_samples_are_averaged_over_longer_times() -> None:
     for times in (np.arange(0, 9000, 500), np.array([0, 20, 40, 700, 720, 740, 1400])):
         poses = np.column_stack((times / 2000, np.zeros((len(times), 2))))
-        found = velocity_from_poses(times, poses, 1000)
-        np.testing.assert_allclose(found, np.tile([0.5, 0.0, 0.0], (len(times), 1)), atol=1e-9)
+        velocities = velocity_from_poses(times, poses, 1000)
+        np.testing.assert_allclose(velocities, np.tile([0.5, 0.0, 0.0], (len(times), 1)), atol=1e-9)
 
 
 @pytest.mark.parametrize("size", [0.2, 0.5, 0.9, 0.995])
@@ -200,8 +202,8 @@ def test_a_log_of_ros_1_is_refused(refused: Callable[..., str], tmp_path: Path) 
 
 
 def test_topic_of_another_type_is_ignored_with_a_note(read: Callable[..., ForeignLog]) -> None:
-    renamed = [replace(one, topic="/amcl_pose") for one in drive() if one.topic == "/scan"]
-    log = read([*(one for one in drive() if one.topic != "/amcl_pose"), *renamed])
+    renamed = [replace(entry, topic="/amcl_pose") for entry in drive() if entry.topic == "/scan"]
+    log = read([*(entry for entry in drive() if entry.topic != "/amcl_pose"), *renamed])
     assert log.coverage.missing[Evidence.BELIEF].startswith("/amcl_pose is a sensor_msgs/msg/LaserScan, expected ")
 
 
@@ -212,8 +214,8 @@ def test_messages_that_are_not_cdr_are_ignored_with_a_note(refused: Callable[...
 def test_poses_with_an_invalid_orientation_are_ignored(tmp_path: Path) -> None:
     """A tracking system that has lost the robot sends zeros."""
     messages = drive()
-    lost = [k for k, one in enumerate(messages) if one.topic == "/mocap"][40:44]
-    for k in lost:
+    invalid = [k for k, entry in enumerate(messages) if entry.topic == "/mocap"][40:44]
+    for k in invalid:
         messages[k] = replace(messages[k], message=replace_orientation(messages[k].message))
     log = read_foreign_log(write_mcap(tmp_path / "a.mcap", messages), MOCAP)
     assert len(log.trace.truth) == 201 - 4
@@ -221,7 +223,7 @@ def test_poses_with_an_invalid_orientation_are_ignored(tmp_path: Path) -> None:
 
 
 def test_messages_that_do_not_match_their_type_are_refused(refused: Callable[..., str]) -> None:
-    only = [one for one in drive() if one.topic == "/mocap"]
+    only = [entry for entry in drive() if entry.topic == "/mocap"]
     cut = refused(only, change=lambda data: data[:40])
     assert "message 1 of /mocap cannot be read as geometry_msgs/msg/PoseStamped" in cut
     assert "longer than its type" in refused(only, change=lambda data: data + bytes(8))
@@ -232,22 +234,24 @@ def test_messages_that_do_not_match_their_type_are_refused(refused: Callable[...
 
 def replace_orientation(message: Any) -> Any:
     """Return the message with an orientation of zeros."""
-    turn = STORE.types["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=0.0)
-    where = STORE.types["geometry_msgs/msg/Pose"](position=message.pose.position, orientation=turn)
-    return STORE.types["geometry_msgs/msg/PoseStamped"](header=message.header, pose=where)
+    orientation = STORE.types["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=0.0)
+    pose = STORE.types["geometry_msgs/msg/Pose"](position=message.pose.position, orientation=orientation)
+    return STORE.types["geometry_msgs/msg/PoseStamped"](header=message.header, pose=pose)
 
 
 def test_big_endian_messages_are_read(tmp_path: Path) -> None:
-    messages = [one for one in drive() if one.topic == "/mocap"]
+    messages = [entry for entry in drive() if entry.topic == "/mocap"]
     little = read_foreign_log(write_mcap(tmp_path / "l.mcap", messages), MOCAP)
-    big = [bytes(STORE.serialize_cdr(one.message, one.message.__msgtype__, little_endian=False)) for one in messages]
-    rest = iter(big)
-    log = read_foreign_log(write_mcap(tmp_path / "b.mcap", messages, change=lambda _: next(rest)), MOCAP)
+    big = [
+        bytes(STORE.serialize_cdr(entry.message, entry.message.__msgtype__, little_endian=False)) for entry in messages
+    ]
+    big_endian = iter(big)
+    log = read_foreign_log(write_mcap(tmp_path / "b.mcap", messages, change=lambda _: next(big_endian)), MOCAP)
     assert np.array_equal(log.trace.truth.values, little.trace.truth.values)
 
 
 def test_log_without_known_topics_is_refused_with_a_list_of_its_topics(refused: Callable[..., str]) -> None:
-    error = refused([replace(one, topic="/robot1" + one.topic) for one in drive()])
+    error = refused([replace(entry, topic="/robot1" + entry.topic) for entry in drive()])
     assert error.startswith("SC804 it has no messages that can be judged (its topics: /robot1/amcl_pose, ")
     other = refused([], ForeignLogOptions())
     assert "its topics: none" in other
@@ -256,7 +260,7 @@ def test_log_without_known_topics_is_refused_with_a_list_of_its_topics(refused: 
 def test_topics_may_have_other_names(read: Callable[..., ForeignLog]) -> None:
     names = {name: f"/robot1/{name}" for name in ("odom", "amcl_pose", "scan", "cmd_vel")}
     log = read(
-        [replace(one, topic="/robot1" + one.topic) for one in drive()], ForeignLogOptions("/robot1/mocap", names)
+        [replace(entry, topic="/robot1" + entry.topic) for entry in drive()], ForeignLogOptions("/robot1/mocap", names)
     )
     assert len(log.trace.belief) == 21 and len(log.trace.truth) == 201
 
@@ -276,8 +280,8 @@ def test_action_status_gives_goal_results(read: Callable[..., ForeignLog]) -> No
         ("goal.accepted", "shelf", 1), ("goal.reached", "shelf", 4), ("goal.accepted", "dock", 5),
         ("goal.failed", "dock", 8), ("navigation.ended", "FAILED", 8), ("run.ended", "the recording ends", 10),
     ]  # fmt: skip
-    one = read(messages, ForeignLogOptions(truth="/mocap", goals=("shelf",)))
-    assert one.coverage.missing[Evidence.NAVIGATION] == "the log has 2 goals, the scenario 1 goal"
+    with_one_goal = read(messages, ForeignLogOptions(truth="/mocap", goals=("shelf",)))
+    assert with_one_goal.coverage.missing[Evidence.NAVIGATION] == "the log has 2 goals, the scenario 1 goal"
 
 
 ACCEPTED_AT, ENDED_AT = (1, 5, 7), (4, 6, 9)
@@ -309,7 +313,9 @@ def test_navigation_with_a_failed_goal_has_failed(
     assert [(event.name, round(log.trace.seconds(event.tick))) for event in ended] == results
 
 
-def test_bag_without_rosbags_error_states_the_install_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_error_for_a_bag_without_rosbags_states_the_install_command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     bag = write_bag(tmp_path / "bag", drive(1.0))
     monkeypatch.setitem(sys.modules, "rosbags.rosbag2", None)
     with pytest.raises(InvalidInput) as raised:
@@ -317,11 +323,11 @@ def test_bag_without_rosbags_error_states_the_install_command(tmp_path: Path, mo
     assert raised.value.problems[0].hint == "pip install 'rosbags>=0.10,<1'"
 
 
-@pytest.mark.parametrize("spoil", ["cut", "empty", "no metadata", "not yaml"])
-def test_a_damaged_bag_is_reported_without_a_traceback(tmp_path: Path, spoil: str) -> None:
+@pytest.mark.parametrize("damage", ["cut", "empty", "no metadata", "not yaml"])
+def test_a_damaged_bag_is_reported_without_a_traceback(tmp_path: Path, damage: str) -> None:
     bag = write_bag(tmp_path / "bag", drive())
     (database,) = bag.glob("*.db3")
-    match spoil:
+    match damage:
         case "cut":
             database.write_bytes(database.read_bytes()[:5000])
         case "empty":

@@ -1,4 +1,4 @@
-"""Tests of rosbag2 folders whose metadata.yaml and storage disagree, and of other files that are not whole logs."""
+"""Tests of rosbag2 folders: split bags, and storage that does not match metadata.yaml."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -46,7 +46,7 @@ def test_files_of_a_split_bag_are_one_log(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("plugin", [StoragePlugin.SQLITE3, StoragePlugin.MCAP])
 def test_a_topic_without_a_slash_is_read_as_an_absolute_topic(tmp_path: Path, plugin: StoragePlugin) -> None:
-    """Bags that a program wrote often have such topics, for example those that are converted from ROS 1."""
+    """Such topics are common in bags that were converted from ROS 1."""
     relative = [replace(message, topic=message.topic[1:]) for message in drive()]
     log = read(write_bag(tmp_path / "bag", relative, plugin))
     assert len(log.trace.truth) == 201
@@ -55,7 +55,7 @@ def test_a_topic_without_a_slash_is_read_as_an_absolute_topic(tmp_path: Path, pl
 
 @pytest.mark.parametrize("part", [0, 1, 2])
 def test_a_split_bag_without_one_of_its_files_is_refused(tmp_path: Path, part: int) -> None:
-    """The criteria would pass on the rest of the drive."""
+    """Otherwise, the criteria would pass on the remaining part of the drive."""
     bag = split_bag(tmp_path / "bag", drive(), 3)
     (bag / f"bag_{part}.mcap").unlink()
     with pytest.raises(InvalidInput, match=f"metadata.yaml lists bag_{part}.mcap, which is missing"):

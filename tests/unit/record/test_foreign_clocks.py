@@ -1,4 +1,4 @@
-"""Tests of clocks and stamps in logs of real robots: which are used, converted, or refused."""
+"""Tests of clocks and stamps in logs of real robots: clock conversion, clock steps, and missing stamps."""
 
 import random
 from collections.abc import Callable
@@ -14,8 +14,8 @@ from foreign_logs import (
     SPEED,
     STORE,
     Message,
-    believed,
     drive,
+    estimated_pose,
     header,
     link,
     stamped_pose,
@@ -44,14 +44,14 @@ def test_times_are_taken_from_message_headers(read: Callable[..., ForeignLog]) -
 
 def test_times_without_header_are_converted_to_the_clock_of_the_headers(read: Callable[..., ForeignLog]) -> None:
     """Twist has no header, and with simulated time the clock of the log has another rate."""
-    messages = [replace(one, time=BEGIN + 2 * (one.time - 5 * SECOND)) for one in drive(begin=5 * SECOND)]
+    messages = [replace(entry, time=BEGIN + 2 * (entry.time - 5 * SECOND)) for entry in drive(begin=5 * SECOND)]
     trace = read(messages).trace
     assert trace.seconds(trace.end) == pytest.approx(10.0, abs=0.2)
     assert np.abs(trace.command.ticks - trace.truth.ticks).max() <= 2
 
 
 def test_repeated_and_late_stamps_are_sorted_and_noted(read: Callable[..., ForeignLog]) -> None:
-    messages = [one for one in drive() if one.topic == "/mocap"]
+    messages = [entry for entry in drive() if entry.topic == "/mocap"]
     first, second = messages[10:12]
     messages[10:12] = [replace(first, message=second.message), replace(second, message=first.message)]
     messages.insert(51, replace(messages[50], time=messages[50].time + 1))
@@ -63,35 +63,38 @@ def test_repeated_and_late_stamps_are_sorted_and_noted(read: Callable[..., Forei
 
 
 def test_stamps_that_do_not_advance_are_refused(refused: Callable[..., str]) -> None:
-    """The whole drive would be judged as one moment."""
-    messages = [one for one in drive() if one.topic == "/mocap"]
-    frozen = [replace(one, message=replace(one.message, header=header(BEGIN, "map"))) for one in messages]
+    """Otherwise, the whole drive would be judged as one moment."""
+    messages = [entry for entry in drive() if entry.topic == "/mocap"]
+    frozen = [replace(entry, message=replace(entry.message, header=header(BEGIN, "map"))) for entry in messages]
     assert "the stamps of the 201 messages of /mocap do not advance" in refused(frozen)
 
 
 def test_a_single_true_pose_shows_neither_path_nor_velocity(read: Callable[..., ForeignLog]) -> None:
-    (first, *_) = (one for one in drive() if one.topic == "/mocap")
+    (first, *_) = (entry for entry in drive() if entry.topic == "/mocap")
     missing = read([first]).coverage.missing
     reason = "/mocap has messages of only one time"
     assert (missing[Evidence.TRUTH], missing[Evidence.VELOCITY]) == (reason, reason)
 
 
 def test_a_clock_that_jumps_back_is_refused(refused: Callable[..., str]) -> None:
-    messages = drive(4.0) + [replace(one, time=one.time + 5 * SECOND) for one in drive(4.0)]
+    messages = drive(4.0) + [replace(entry, time=entry.time + 5 * SECOND) for entry in drive(4.0)]
     assert refused(messages).startswith("SC804 the time of /mocap jumps back by 4.0 s at its message 82 (")
 
 
 def with_clock_step(seconds: float, also_recorder: bool = False) -> list[Message]:
-    """Return a drive in which the clock of the stamps, and optionally that of the recorder, is set after 5 s."""
+    """Return a drive in which the clock of the stamps is set by `seconds` after 5 s.
+
+    With `also_recorder`, the clock of the recorder is set, too.
+    """
     step, messages = round(seconds * SECOND), []
-    for one in drive():
-        if one.time > BEGIN + 5 * SECOND + LATENCY and hasattr(one.message, "header"):
-            stamp = one.message.header.stamp
-            stepped = header(stamp.sec * SECOND + stamp.nanosec + step, one.message.header.frame_id)
-            time = one.time + step if also_recorder else one.time
-            messages.append(Message(one.topic, time, replace(one.message, header=stepped)))
+    for entry in drive():
+        if entry.time > BEGIN + 5 * SECOND + LATENCY and hasattr(entry.message, "header"):
+            stamp = entry.message.header.stamp
+            stepped = header(stamp.sec * SECOND + stamp.nanosec + step, entry.message.header.frame_id)
+            time = entry.time + step if also_recorder else entry.time
+            messages.append(Message(entry.topic, time, replace(entry.message, header=stepped)))
         else:
-            messages.append(one)
+            messages.append(entry)
     return messages
 
 
@@ -107,9 +110,10 @@ def test_clock_that_is_set_while_recording_is_refused(
 
 
 def with_busy_start(step: int = 0) -> tuple[np.ndarray, np.ndarray]:
-    """Return times of logging and stamps (ns) as in a public log: 90 Hz, logged from 1.1 s on, 0.1 s lost before.
+    """Return log times and stamps in ns of a topic at 90 Hz, as in a public log.
 
-    The clock of the stamps is set by `step` ns at 5 s.
+    The recorder starts late: messages before 1.1 s are logged at 1.1 s, and some of them are lost. The clock of the
+    stamps is set by `step` ns at 5 s.
     """
     stamps = np.arange(0, 10 * SECOND, 11_000_000)
     is_lost = np.zeros(len(stamps), dtype=bool)
@@ -128,12 +132,12 @@ def test_busy_start_of_the_recorder_is_not_a_clock_step() -> None:
 
 
 def test_log_is_judged_from_the_first_recorded_scan(read: Callable[..., ForeignLog]) -> None:
-    late = [one for one in drive() if one.topic != "/scan" or one.time > BEGIN + SECOND]
+    late = [entry for entry in drive() if entry.topic != "/scan" or entry.time > BEGIN + SECOND]
     log = read(late)
     assert log.notes == ["/scan is recorded 1.0 s after the first message; the log is judged from then on"]
     assert (log.trace.scans[0], log.trace.seconds(log.trace.end)) == (0, pytest.approx(9.1, abs=0.1))
     assert log.trace.truth.values[0, 0] == pytest.approx(SPEED * 1.0, abs=0.03)
-    silent = read([one for one in drive() if one.topic != "/scan" or one.time > BEGIN + 3 * SECOND])
+    silent = read([entry for entry in drive() if entry.topic != "/scan" or entry.time > BEGIN + 3 * SECOND])
     assert (silent.notes, silent.trace.scans[0]) == ([], pytest.approx(3000, abs=50))
 
 
@@ -160,33 +164,33 @@ def test_recorder_clock_was_set_back_if_parts_of_the_log_overlap(
         check_recorder_clock("/odom", times, times)
 
 
-def delayed(messages: list[Message], start: float, end: float, seconds: float) -> list[Message]:
-    """Return messages of one topic in order, those between two times (s) logged late."""
+def with_delay(messages: list[Message], start: float, end: float, seconds: float) -> list[Message]:
+    """Return messages of one topic. Those between `start` and `end` in s are logged late by `seconds`."""
     late, last = [], 0
-    for one in messages:
-        is_late = start * SECOND <= one.time - BEGIN < end * SECOND
-        last = max(last, one.time + (round(seconds * SECOND) if is_late else 0))
-        late.append(replace(one, time=last))
+    for entry in messages:
+        is_late = start * SECOND <= entry.time - BEGIN < end * SECOND
+        last = max(last, entry.time + (round(seconds * SECOND) if is_late else 0))
+        late.append(replace(entry, time=last))
     return late
 
 
 @pytest.mark.parametrize("change", ["shuffled", "reversed", "stalled", "slow start", "slow end", "jitter"])
 def test_order_and_delay_of_logging_do_not_change_stamped_poses(read: Callable[..., ForeignLog], change: str) -> None:
-    messages, rng = [one for one in drive() if one.topic == "/mocap"], random.Random(4)
+    messages, rng = [entry for entry in drive() if entry.topic == "/mocap"], random.Random(4)
     changed = {
         "shuffled": lambda: rng.sample(messages, len(messages)),
         "reversed": lambda: messages[::-1],
-        "stalled": lambda: delayed(messages, 4.0, 5.0, 1.5),
-        "slow start": lambda: delayed(messages, 0.0, 3.0, 0.5),
-        "slow end": lambda: delayed(messages, 5.0, 99.0, 0.5),
-        "jitter": lambda: [replace(one, time=one.time + rng.randrange(SECOND // 3)) for one in messages],
+        "stalled": lambda: with_delay(messages, 4.0, 5.0, 1.5),
+        "slow start": lambda: with_delay(messages, 0.0, 3.0, 0.5),
+        "slow end": lambda: with_delay(messages, 5.0, 99.0, 0.5),
+        "jitter": lambda: [replace(entry, time=entry.time + rng.randrange(SECOND // 3)) for entry in messages],
     }[change]()
     assert (read(changed).trace.truth.values == read(messages).trace.truth.values).all()
 
 
 def test_topics_of_different_clocks_are_refused(refused: Callable[..., str], read: Callable[..., ForeignLog]) -> None:
-    messages = [one for one in drive() if one.topic == "/mocap"]
-    messages += [Message("/amcl_pose", BEGIN + k * SECOND, believed(k * SECOND, SPEED * k)) for k in range(10)]
+    messages = [entry for entry in drive() if entry.topic == "/mocap"]
+    messages += [Message("/amcl_pose", BEGIN + k * SECOND, estimated_pose(k * SECOND, SPEED * k)) for k in range(10)]
     assert "/amcl_pose and /mocap do not share a clock" in refused(messages)
     assert len(read(messages, ForeignLogOptions(truth="/mocap", clock="log")).trace.belief) == 10
 
@@ -199,18 +203,18 @@ def test_single_messages_without_a_stamp_do_not_move_the_others(
 ) -> None:
     """Drivers send such messages until they know the time."""
     messages, expected = drive(begin=begin), read(drive(begin=begin)).trace
-    one = [one for one in messages if one.topic == topic][index]
-    one.message.header.stamp = header(0, "").stamp
+    unstamped = [entry for entry in messages if entry.topic == topic][index]
+    unstamped.message.header.stamp = header(0, "").stamp
     log = read(messages)
     trace = log.trace
     assert list(log.notes) == ([] if topic == "/scan" else [f"{topic}: messages without a stamp are ignored (1)"])
     assert trace.end == expected.end and not log.coverage.partial
     for name in ("truth", "belief", "odometry"):
-        found, wanted = getattr(trace, name), getattr(expected, name)
-        assert len(wanted) - len(found) <= 1
-        rows = np.isin(wanted.ticks, found.ticks)
-        assert rows.sum() == len(found)
-        np.testing.assert_array_equal(found.values, wanted.values[rows])
+        samples, expected_samples = getattr(trace, name), getattr(expected, name)
+        assert len(expected_samples) - len(samples) <= 1
+        rows = np.isin(expected_samples.ticks, samples.ticks)
+        assert rows.sum() == len(samples)
+        np.testing.assert_array_equal(samples.values, expected_samples.values[rows])
     assert len(trace.scans) == len(expected.scans)
     assert np.abs(trace.scans - expected.scans).max() <= 20
 
@@ -224,11 +228,11 @@ def test_plans_are_in_the_order_of_their_stamps(read: Callable[..., ForeignLog])
         for logged, at in ((5, 4), (6, 3), (8, 7))
     ]
     plans = read([*drive(), *late]).trace.plans
-    assert [(one.tick, one.points[0, 0]) for one in plans] == [(3000, 3.0), (4000, 4.0), (7000, 7.0)]
+    assert [(path.tick, path.points[0, 0]) for path in plans] == [(3000, 3.0), (4000, 4.0), (7000, 7.0)]
 
 
 def test_log_times_replace_zero_stamps(read: Callable[..., ForeignLog]) -> None:
-    messages = [one for one in drive() if one.topic != "/mocap"]
+    messages = [entry for entry in drive() if entry.topic != "/mocap"]
     poses = [stamped_pose(0, "map", SPEED * k / 20) for k in range(201)]
     messages += [Message("/mocap", BEGIN + k * SECOND // 20, pose) for k, pose in enumerate(poses)]
     log = read(messages)
@@ -236,8 +240,8 @@ def test_log_times_replace_zero_stamps(read: Callable[..., ForeignLog]) -> None:
     assert log.notes == ["/mocap: all stamps are zero, so the times of logging are used"]
 
 
-def transforms(stamp_of_step: Callable[[int], int]) -> list[Message]:
-    """Return a drive on /tf, map → odom → base_link at 20 Hz, with the stamp of each step."""
+def transform_messages(stamp_of_step: Callable[[int], int]) -> list[Message]:
+    """Return a drive on /tf, map → odom → base_link, at 20 Hz. `stamp_of_step` returns the stamp of step k in ns."""
     messages = []
     for k in range(201):
         time, stamp = BEGIN + k * SECOND // 20, stamp_of_step(k)
@@ -248,7 +252,7 @@ def transforms(stamp_of_step: Callable[[int], int]) -> list[Message]:
 
 @pytest.mark.parametrize("clock", ["header", "log"])
 def test_log_times_replace_zero_stamps_of_transforms(read: Callable[..., ForeignLog], clock: TimeSource) -> None:
-    log = read(transforms(lambda _: 0), ForeignLogOptions(truth="map:base_link", clock=clock))
+    log = read(transform_messages(lambda _: 0), ForeignLogOptions(truth="map:base_link", clock=clock))
     np.testing.assert_allclose(log.trace.truth.values[:, 0], SPEED * log.trace.truth.ticks / 1000, atol=1e-6)
     assert len(log.trace.truth) == 201
 
@@ -256,13 +260,13 @@ def test_log_times_replace_zero_stamps_of_transforms(read: Callable[..., Foreign
 def test_transforms_of_a_clock_that_jumps_back_are_judged_by_log_times(
     read: Callable[..., ForeignLog], refused: Callable[..., str]
 ) -> None:
-    messages = transforms(lambda k: BEGIN + k * SECOND // 20 - (5 * SECOND if k > 100 else 0))
+    messages = transform_messages(lambda k: BEGIN + k * SECOND // 20 - (5 * SECOND if k > 100 else 0))
     assert "the time of tf map:base_link jumps back by 5.0 s" in refused(messages, ForeignLogOptions("map:base_link"))
     log = read(messages, ForeignLogOptions(truth="map:base_link", clock="log"))
     np.testing.assert_allclose(log.trace.truth.values[:, 0], SPEED * log.trace.truth.ticks / 1000, atol=1e-6)
 
 
 def test_order_of_transforms_in_the_file_does_not_matter(read: Callable[..., ForeignLog]) -> None:
-    messages, options = transforms(lambda k: BEGIN + k * SECOND // 20), ForeignLogOptions(truth="map:base_link")
+    messages, options = transform_messages(lambda k: BEGIN + k * SECOND // 20), ForeignLogOptions(truth="map:base_link")
     shuffled = random.Random(1).sample(messages, len(messages))
     assert (read(shuffled, options).trace.truth.values == read(messages, options).trace.truth.values).all()

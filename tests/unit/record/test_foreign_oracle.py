@@ -1,4 +1,4 @@
-"""Tests that a simscen log gives the same verdicts when it is read like a third-party log."""
+"""Tests that a log of simscen gives the same verdicts when it is read like the log of a real robot."""
 
 import random
 from pathlib import Path
@@ -34,8 +34,8 @@ TRUTH = ForeignLogOptions(truth="/ground_truth/odom", tick_rate=240)
 
 
 @pytest.fixture(scope="module")
-def own(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Return the log of a short drive."""
+def simscen_log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The log of a short run."""
     folder = tmp_path_factory.mktemp("own")
     (folder / "a.scenario.yaml").write_text(SCENARIO)
     simulate(prepare(load_scenario(folder / "a.scenario.yaml", folder)), 1, log=folder / "run.mcap")
@@ -43,10 +43,10 @@ def own(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def disguised(own: Path) -> Path:
-    """Return a log with the same messages, without metadata, written by the mcap library."""
-    file = own.with_name("disguised.mcap")
-    with open_log(own) as source, file.open("wb") as stream:
+def anonymous_log(simscen_log: Path) -> Path:
+    """A log with the same messages, but without the metadata of simscen, written by the mcap library."""
+    file = simscen_log.with_name("anonymous.mcap")
+    with open_log(simscen_log) as source, file.open("wb") as stream:
         writer = Writer(stream)
         writer.start("ros2", "other recorder")
         schemas, channels = {}, {}
@@ -64,20 +64,20 @@ def disguised(own: Path) -> Path:
     return file
 
 
-def test_signals_are_bit_identical(own: Path, disguised: Path) -> None:
-    """Headings may differ by rounding of normalized quaternions."""
-    assert is_simscen_log(own) and not is_simscen_log(disguised)
-    ours, theirs = read_log(own).trace, read_foreign_log(disguised, TRUTH).trace
+def test_signals_are_bit_identical(simscen_log: Path, anonymous_log: Path) -> None:
+    """Headings may differ by rounding, because quaternions are normalized."""
+    assert is_simscen_log(simscen_log) and not is_simscen_log(anonymous_log)
+    trace, foreign_trace = read_log(simscen_log).trace, read_foreign_log(anonymous_log, TRUTH).trace
     for name in ("truth", "velocity", "belief", "odometry", "command"):
-        mine, its = getattr(ours, name), getattr(theirs, name)
-        np.testing.assert_array_equal(mine.ticks, its.ticks, name)
-        np.testing.assert_allclose(mine.values, its.values, rtol=0, atol=1e-12, err_msg=name)
-    np.testing.assert_array_equal(ours.scans, theirs.scans)
-    assert (ours.end, len(ours.plans)) == (theirs.end, len(theirs.plans))
+        expected, samples = getattr(trace, name), getattr(foreign_trace, name)
+        np.testing.assert_array_equal(expected.ticks, samples.ticks, name)
+        np.testing.assert_allclose(expected.values, samples.values, rtol=0, atol=1e-12, err_msg=name)
+    np.testing.assert_array_equal(trace.scans, foreign_trace.scans)
+    assert (trace.end, len(trace.plans)) == (foreign_trace.end, len(foreign_trace.plans))
 
 
 @pytest.mark.parametrize(
-    "text",
+    "criterion",
     [
         {"speed": {"max": 0.45}},
         {"speed": {"max": 5.0, "max_turn_rate": 0.2}},
@@ -86,14 +86,14 @@ def test_signals_are_bit_identical(own: Path, disguised: Path) -> None:
         {"always": {"signal": "turn_rate", "op": "<=", "value": 3.0}},
     ],
 )
-def test_verdicts_and_margins_are_equal(own: Path, disguised: Path, text: dict[str, object]) -> None:
-    entry = AnyCriterion.model_validate(text)
-    log, foreign = read_log(own), read_foreign_log(disguised, TRUTH)
-    (mine,) = judge([entry], log.trace, log.header.case)
-    (its,) = judge([entry], foreign.trace, log.header.case, foreign.coverage)
-    assert [finding.status for finding in mine.findings] == [finding.status for finding in its.findings]
-    assert [f.margin for f in mine.findings] == pytest.approx([f.margin for f in its.findings], abs=1e-9)
-    assert Status.INCONCLUSIVE not in {finding.status for finding in its.findings}
+def test_verdicts_and_margins_are_equal(simscen_log: Path, anonymous_log: Path, criterion: dict[str, object]) -> None:
+    entry = AnyCriterion.model_validate(criterion)
+    log, foreign = read_log(simscen_log), read_foreign_log(anonymous_log, TRUTH)
+    (verdict,) = judge([entry], log.trace, log.header.case)
+    (foreign_verdict,) = judge([entry], foreign.trace, log.header.case, foreign.coverage)
+    assert [finding.status for finding in verdict.findings] == [finding.status for finding in foreign_verdict.findings]
+    assert [f.margin for f in verdict.findings] == pytest.approx([f.margin for f in foreign_verdict.findings], abs=1e-9)
+    assert Status.INCONCLUSIVE not in {finding.status for finding in foreign_verdict.findings}
 
 
 @pytest.mark.parametrize("options", [*CHUNKED.values(), {"use_chunking": False}])
@@ -102,10 +102,10 @@ def test_a_log_with_wrong_bytes_is_read_or_refused(tmp_path: Path, options: dict
     data = write_mcap(file, drive(2.0), **options).read_bytes()
     refused = 0
     for _ in range(150):
-        spoilt = bytearray(data)
+        damaged = bytearray(data)
         for _ in range(rng.choice((1, 3, 20))):
-            spoilt[rng.randrange(8, len(data))] = rng.randrange(256)
-        file.write_bytes(spoilt[: rng.choice((len(data), rng.randrange(8, len(data))))])
+            damaged[rng.randrange(8, len(data))] = rng.randrange(256)
+        file.write_bytes(damaged[: rng.choice((len(data), rng.randrange(8, len(data))))])
         is_simscen_log(file)
         try:
             read_foreign_log(file, ForeignLogOptions(truth="/mocap"))

@@ -17,27 +17,31 @@ from simscen.record.foreign.options import ForeignLogOptions
 from simscen.record.foreign.read import read_foreign_log
 
 
-class Ended(NamedTuple):
+class Completed(NamedTuple):
+    """Exit code and output of a command."""
+
     code: int
     out: str
     err: str
 
 
 @pytest.fixture
-def simscen(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Callable[..., Ended]:
-    def call(*arguments: str) -> Ended:
+def simscen(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> Callable[..., Completed]:
+    """Return a function that runs `simscen ARGUMENTS`."""
+
+    def call(*arguments: str) -> Completed:
         monkeypatch.setattr(sys, "argv", ["simscen", *arguments])
         code = 0
         try:
             main()
         except SystemExit as end:
             code = int(end.code or 0)
-        return Ended(code, *capsys.readouterr())
+        return Completed(code, *capsys.readouterr())
 
     return call
 
 
-def a_map() -> Message:
+def map_message() -> Message:
     info = T["nav_msgs/msg/MapMetaData"](
         map_load_time=header(BEGIN, "").stamp,
         resolution=0.1,
@@ -52,13 +56,13 @@ def a_map() -> Message:
     return Message("/map", BEGIN, T["nav_msgs/msg/OccupancyGrid"](header=header(BEGIN, "map"), info=info, data=cells))
 
 
-def mounted(topic: str = "/tf_static") -> Message:
+def mount_message(topic: str = "/tf_static") -> Message:
     return Message(topic, BEGIN, link(BEGIN, "base_link", "laser", 0.2))
 
 
 @pytest.mark.parametrize(("write", "topic"), [(write_mcap, "/tf_static"), (write_bag, "/tf")])
 def test_scans_map_and_lidar_mounts_are_read(tmp_path: Path, write: Callable[..., object], topic: str) -> None:
-    write(tmp_path / "log.mcap", [a_map(), mounted(topic), *drive(2.0)])
+    write(tmp_path / "log.mcap", [map_message(), mount_message(topic), *drive(2.0)])
     read = read_foreign_log(tmp_path / "log.mcap", ForeignLogOptions("/mocap"), with_sensors=True)
     assert read.map is not None and read.map.shape == (3, 4) and read.map.origin[:2] == (-1.0, -2.0)
     (messages,) = read.sensors.scans.values()
@@ -100,26 +104,28 @@ def test_a_lidar_can_have_an_infinite_maximum_range(simscen, tmp_path: Path) -> 
         if message.topic == "/scan":
             message.message.range_max = np.inf
     write_mcap(tmp_path / "log.mcap", log)
-    ended = simscen("replay", str(tmp_path / "log.mcap"), "--truth", "/mocap")
-    assert (ended.code, ended.err) == (0, "")
+    completed = simscen("replay", str(tmp_path / "log.mcap"), "--truth", "/mocap")
+    assert (completed.code, completed.err) == (0, "")
 
 
 def test_replay_page_is_written_with_and_without_criteria(simscen, tmp_path: Path) -> None:
     log = tmp_path / "monday.mcap"
-    write_mcap(log, [a_map(), mounted(), *drive(2.0)])
-    ended = simscen("replay", str(log), "--truth", "/mocap")
+    write_mcap(log, [map_message(), mount_message(), *drive(2.0)])
+    completed = simscen("replay", str(log), "--truth", "/mocap")
     page = tmp_path / "monday.replay.html"
-    assert (ended.code, ended.out) == (0, f"{page}\n")
+    assert (completed.code, completed.out) == (0, f"{page}\n")
     assert "<title>monday, seed 0, skipped</title>" in page.read_text()
     (tmp_path / "limits.yaml").write_text("simscen: 1\npass: [{localization_error: {max: 0.01 m}}]\n")
-    ended = simscen("replay", str(log), "--truth", "/mocap", "--scenario", str(tmp_path / "limits.yaml"))
-    assert ended.code == 0 and "<title>monday, seed 0, failed</title>" in page.read_text()
+    completed = simscen("replay", str(log), "--truth", "/mocap", "--scenario", str(tmp_path / "limits.yaml"))
+    assert completed.code == 0 and "<title>monday, seed 0, failed</title>" in page.read_text()
 
 
-@pytest.mark.parametrize(("kept", "is_complete"), [(1.0, True), (0.6, False)])
-def test_replay_of_a_truncated_log_is_marked_as_truncated(tmp_path: Path, kept: float, is_complete: bool) -> None:
+@pytest.mark.parametrize(("kept_fraction", "is_complete"), [(1.0, True), (0.6, False)])
+def test_replay_of_a_truncated_log_is_marked_as_truncated(
+    tmp_path: Path, kept_fraction: float, is_complete: bool
+) -> None:
     log = tmp_path / "monday.mcap"
-    write_mcap(log, [a_map(), mounted(), *drive(20.0)], chunk_size=10_000)
-    log.write_bytes(log.read_bytes()[: int(kept * log.stat().st_size)])
-    shown, _ = LogJudge(ForeignLogOptions("/mocap"), None, None, ()).judge_for_replay(log)
-    assert shown.complete == is_complete
+    write_mcap(log, [map_message(), mount_message(), *drive(20.0)], chunk_size=10_000)
+    log.write_bytes(log.read_bytes()[: int(kept_fraction * log.stat().st_size)])
+    recorded_run, _ = LogJudge(ForeignLogOptions("/mocap"), None, None, ()).judge_for_replay(log)
+    assert recorded_run.complete == is_complete

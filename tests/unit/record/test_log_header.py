@@ -25,9 +25,9 @@ def test_a_case_is_read_back_equal_with_infinite_distances() -> None:
 @given(st.floats(allow_nan=False), st.floats(allow_nan=False, allow_infinity=False))
 def test_numbers_of_a_case_are_read_back_exactly(shortest: float, x: float) -> None:
     case = Case(Pose2(x, 0.0), (), {"a": shortest}, time_limit=x)
-    again = log_header.case_from_json(log_header.case_to_json(case))
-    assert repr(again.start.x) == repr(again.time_limit) == repr(x)
-    assert repr(again.shortest["a"]) == repr(shortest)
+    decoded = log_header.case_from_json(log_header.case_to_json(case))
+    assert repr(decoded.start.x) == repr(decoded.time_limit) == repr(x)
+    assert repr(decoded.shortest["a"]) == repr(shortest)
 
 
 def test_a_case_is_written_as_strict_json() -> None:
@@ -39,7 +39,7 @@ def test_invalid_cases_are_refused() -> None:
         log_header.case_from_json('{"start": "here"}')
 
 
-def test_facts_of_a_run_have_their_own_metadata_namespace() -> None:
+def test_facts_of_a_run_are_kept_apart_from_other_metadata() -> None:
     facts = log_header.run_metadata(sample_header(), Clock(240))
     assert facts["seed"] == "7"
     assert log_header.extra_facts(facts) == {"simscen": "0.1.0"}

@@ -1,4 +1,4 @@
-"""Tests of the recovery of aborted logs."""
+"""Tests of the recovery of the log of an aborted run."""
 
 import os
 import signal
@@ -23,8 +23,8 @@ def messages(path: Path) -> list[tuple[str, int, bytes]]:
         return [(channel.topic, message.log_time, message.data) for _, channel, message in reader.iter_messages()]
 
 
-def killed(folder: Path, seconds: float) -> Path:
-    """Return the log of a process killed by SIGKILL after this simulated time."""
+def log_of_killed_process(folder: Path, seconds: float) -> Path:
+    """Return the log of a process that is killed by SIGKILL after `seconds` of simulated time."""
     child = os.fork()
     if child == 0:
         recorder = Recorder(folder / "run.mcap", CLOCK, sample_header())
@@ -36,8 +36,8 @@ def killed(folder: Path, seconds: float) -> Path:
 
 
 @pytest.fixture
-def whole(tmp_path: Path) -> Path:
-    path = tmp_path / "whole.mcap"
+def complete_log(tmp_path: Path) -> Path:
+    path = tmp_path / "complete.mcap"
     with Recorder(path, CLOCK, sample_header()) as recorder:
         for moment in moments(5.0):
             recorder.append(moment)
@@ -45,31 +45,31 @@ def whole(tmp_path: Path) -> Path:
     return path
 
 
-def test_71_log_truncated_anywhere_opens_in_an_indexed_reader(tmp_path: Path, whole: Path) -> None:
-    expected, size = messages(whole), whole.stat().st_size
+def test_log_truncated_anywhere_opens_in_an_indexed_reader(tmp_path: Path, complete_log: Path) -> None:
+    expected, size = messages(complete_log), complete_log.stat().st_size
     for kept in (0.9, 0.7, 0.31):
-        cut = tmp_path / "cut.partial.mcap"
-        cut.write_bytes(whole.read_bytes()[: int(size * kept)])
-        before = read_log(cut).trace
-        assert recover(cut)
-        found = messages(cut)
-        assert found == expected[: len(found)]
-        assert not read_log(cut).complete
-        assert read_log(cut).trace.truth.values.tolist() == before.truth.values.tolist()
-        assert not recover(cut), "it is whole now"
+        truncated = tmp_path / "cut.partial.mcap"
+        truncated.write_bytes(complete_log.read_bytes()[: int(size * kept)])
+        before = read_log(truncated).trace
+        assert recover(truncated)
+        recovered = messages(truncated)
+        assert recovered == expected[: len(recovered)]
+        assert not read_log(truncated).complete
+        assert read_log(truncated).trace.truth.values.tolist() == before.truth.values.tolist()
+        assert not recover(truncated), "a recovered log needs no recovery"
         assert [path.name for path in tmp_path.iterdir() if path.name.startswith(".")] == []
 
 
-def test_71_a_killed_log_keeps_95_percent_for_other_readers(tmp_path: Path, whole: Path) -> None:
-    cut = killed(tmp_path, 5.0)
-    recover(cut)
-    assert len(messages(cut)) >= 0.95 * len(messages(whole))
+def test_a_killed_log_keeps_95_percent_for_other_readers(tmp_path: Path, complete_log: Path) -> None:
+    truncated = log_of_killed_process(tmp_path, 5.0)
+    recover(truncated)
+    assert len(messages(truncated)) >= 0.95 * len(messages(complete_log))
 
 
 @pytest.mark.parametrize("seconds", [0.95, 1.85, 2.75, 4.4])
 def test_a_killed_run_loses_at_most_one_simulated_second(tmp_path: Path, seconds: float) -> None:
     child = os.fork()
-    if child == 0:  # writes through the same buffer as a run, and never flushes it by itself
+    if child == 0:  # writes through the buffer that runs use, and never flushes it explicitly
         recorder = Recorder(tmp_path / "run.mcap", CLOCK, sample_header())
         log = MomentBuffer(CLOCK.ticks(MOMENT_DELAY_S), recorder).sink(recorder.robots[""])
         for moment in moments(seconds):
@@ -95,7 +95,7 @@ def test_aborted_run_leaves_a_readable_log(tmp_path: Path) -> None:
 
 
 def test_truncated_log_of_another_program_is_unchanged(tmp_path: Path) -> None:
-    """Its encodings, publish times, and sequence numbers would be lost."""
+    """Recovery would lose encodings, publish times, and sequence numbers."""
     file = write_mcap(tmp_path / "a.mcap", drive(), encoding="json", **UNINDEXED)
     file.write_bytes(file.read_bytes()[: int(0.9 * file.stat().st_size)])
     before = file.read_bytes()

@@ -1,4 +1,4 @@
-"""Tests that the mcap library reads the written files in every way, with checksums."""
+"""Tests that the mcap library reads the files of McapWriter: by index, as a stream, and with checksums."""
 
 import io
 import random
@@ -22,7 +22,8 @@ TEXT = load_message_types()["std_msgs/msg/String"]
 MESSAGES = [(1 + i % 3, 1000 * (i // 2), random.Random(i).randbytes(300)) for i in range(2000)]
 
 
-def ours() -> bytes:
+def simscen_file() -> bytes:
+    """Return a file of simscen's writer with MESSAGES."""
     stream = io.BytesIO()
     writer = McapWriter(stream, "ros2", "simscen", max_chunk_size=1 << 16)
     channels = [writer.add_channel(f"/t{n}", TEXT, {"key": str(n)}) for n in range(3)]
@@ -34,8 +35,8 @@ def ours() -> bytes:
     return stream.getvalue()
 
 
-def theirs() -> bytes:
-    """Make the same calls on the writer of the mcap library."""
+def reference_file() -> bytes:
+    """Return a file of the mcap library's writer with the same content."""
     stream = io.BytesIO()
     writer = Writer(stream, chunk_size=1 << 16, compression=CompressionType.ZSTD)
     writer.start("ros2", "simscen")
@@ -50,8 +51,8 @@ def theirs() -> bytes:
     return stream.getvalue()
 
 
-def test_summary_equals_that_of_the_mcap_library() -> None:
-    mine, reference = (make_reader(io.BytesIO(data)).get_summary() for data in (ours(), theirs()))
+def test_summary_equals_the_summary_of_the_mcap_library() -> None:
+    mine, reference = (make_reader(io.BytesIO(data)).get_summary() for data in (simscen_file(), reference_file()))
     assert mine is not None
     assert reference is not None
     assert mine.statistics == reference.statistics
@@ -61,40 +62,40 @@ def test_summary_equals_that_of_the_mcap_library() -> None:
 
 
 def test_messages_are_found_through_the_index() -> None:
-    reader = make_reader(io.BytesIO(ours()), validate_crcs=True)
+    reader = make_reader(io.BytesIO(simscen_file()), validate_crcs=True)
     found = [(c.id, m.log_time, m.data) for _, c, m in reader.iter_messages(topics=["/t1"], starting_at=500_000)]
     assert found == [message for message in MESSAGES if message[0] == 2 and message[1] >= 500_000]
 
 
 def test_messages_stream_in_the_order_they_were_written() -> None:
-    reader = NonSeekingReader(io.BytesIO(ours()), validate_crcs=True)
+    reader = NonSeekingReader(io.BytesIO(simscen_file()), validate_crcs=True)
     read = [(c.id, m.log_time, m.data) for _, c, m in reader.iter_messages(log_time_order=False)]
     assert read == MESSAGES
 
 
 def test_attachments_and_metadata_are_found_through_the_index() -> None:
-    reader = make_reader(io.BytesIO(ours()))
+    reader = make_reader(io.BytesIO(simscen_file()))
     assert [(a.name, a.media_type, a.data) for a in reader.iter_attachments()] == [("a.txt", "text/plain", b"hello")]
     assert [(m.name, m.metadata) for m in reader.iter_metadata()] == [("facts", {"seed": "7"})]
 
 
 def test_any_changed_byte_in_the_data_is_detected() -> None:
-    data = bytearray(ours())
+    data = bytearray(simscen_file())
     data[data.index(b"hello")] ^= 1
     with pytest.raises(ValueError, match="crc"):
         list(StreamReader(io.BytesIO(data), validate_crcs=True).records)
 
 
-def test_chunks_and_their_index_equal_those_of_the_mcap_library() -> None:
-    data, kinds = ours(), (records.Chunk, records.ChunkIndex, records.MessageIndex)
-    theirs = []
+def test_chunks_and_their_index_equal_chunks_of_the_mcap_library() -> None:
+    data, kinds = simscen_file(), (records.Chunk, records.ChunkIndex, records.MessageIndex)
+    packed_records = []
     for record in StreamReader(io.BytesIO(data), emit_chunks=True).records:
         if isinstance(record, kinds):
             builder = RecordBuilder()
             record.write(builder)
-            theirs.append(builder.end())
-    assert len(theirs) > 2 * len(kinds)
-    assert all(packed in data for packed in theirs)
+            packed_records.append(builder.end())
+    assert len(packed_records) > 2 * len(kinds)
+    assert all(packed in data for packed in packed_records)
 
 
 def test_message_larger_than_a_chunk_closes_the_current_chunk() -> None:
@@ -122,19 +123,19 @@ def test_file_without_messages_is_valid() -> None:
 
 
 def test_the_same_calls_give_the_same_bytes() -> None:
-    assert ours() == ours()
+    assert simscen_file() == simscen_file()
 
 
 def test_batched_messages_have_the_same_bytes_as_single_ones() -> None:
-    """This holds also if a chunk ends, or another message is written, between them."""
+    """Chunks may end between batched messages, and other messages may be written between them."""
     layouts = (topics.TRUTH, message_templates.odometry("map", "base")), (topics.CLEARANCE, message_templates.float64())
     pose, twist = Pose3(1.0, 2.0), Twist(0.5)
 
-    def written(together: bool) -> bytes:
+    def file_content(is_batched: bool) -> bytes:
         stream = io.BytesIO()
         writer = McapWriter(stream, "ros2", "simscen", max_chunk_size=5000)
         out = LogPublisher(writer)
-        block = out.batch_writer(layouts) if together else BatchWriter(out, layouts)
+        block = out.batch_writer(layouts) if is_batched else BatchWriter(out, layouts)
         for time in range(100):
             block.write(time, (time, 0), pose, twist, 0.25)
             if time % 7 == 0:
@@ -142,6 +143,6 @@ def test_batched_messages_have_the_same_bytes_as_single_ones() -> None:
         writer.finish()
         return stream.getvalue()
 
-    assert written(True) == written(False)
-    reader = make_reader(io.BytesIO(written(True)), validate_crcs=True)
+    assert file_content(True) == file_content(False)
+    reader = make_reader(io.BytesIO(file_content(True)), validate_crcs=True)
     assert len(list(reader.iter_messages(topics=[topics.CLEARANCE.name], start_time=50))) == 50

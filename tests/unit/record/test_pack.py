@@ -1,4 +1,4 @@
-"""Tests that packers write the same bytes as rosbags, and read them back."""
+"""Tests that the message packers write the same bytes as rosbags."""
 
 from typing import Any
 
@@ -23,6 +23,7 @@ stamps = st.tuples(st.integers(0, 2**31 - 1), st.integers(0, 999_999_999))
 
 
 def make(name: str, *fields: Any) -> Any:
+    """Return a ROS message of rosbags."""
     package, short = name.split("/")
     return STORE.types[f"{package}/msg/{short}"](*fields)
 
@@ -49,7 +50,10 @@ def ros_twist(twist: Twist) -> Any:
 
 
 def planar(row: Any) -> Pose3:
-    """Return the pose with the orientation of numpy, as in the packers; the C library may round differently."""
+    """Return the 3D pose of a row x, y, yaw.
+
+    The packers use the sine and cosine of numpy, which may round differently than those of Python.
+    """
     half = np.array([row[2]]) / 2
     return Pose3(float(row[0]), float(row[1]), 0.0, 0.0, 0.0, float(np.sin(half)[0]), float(np.cos(half)[0]))
 
@@ -95,15 +99,15 @@ def test_odometry_with_covariance_bytes_equal_those_of_rosbags(seed: int, stamp:
     rng = np.random.default_rng(seed)
     pose, twist = pose3(rng), Twist(*rng.normal(size=3).tolist())
     covariance, variances = rng.normal(size=(3, 3)), rng.normal(size=3)
-    of_pose, of_twist = np.zeros((6, 6)), np.zeros((6, 6))
-    of_pose[np.ix_([0, 1, 5], [0, 1, 5])] = covariance
-    of_twist[[0, 1, 5], [0, 1, 5]] = variances
+    pose_covariance, twist_covariance = np.zeros((6, 6)), np.zeros((6, 6))
+    pose_covariance[np.ix_([0, 1, 5], [0, 1, 5])] = covariance
+    twist_covariance[[0, 1, 5], [0, 1, 5]] = variances
     expected = make(
         "nav_msgs/Odometry",
         header(stamp, frame),
         child,
-        make("geometry_msgs/PoseWithCovariance", ros_pose(pose), of_pose.ravel()),
-        make("geometry_msgs/TwistWithCovariance", ros_twist(twist), of_twist.ravel()),
+        make("geometry_msgs/PoseWithCovariance", ros_pose(pose), pose_covariance.ravel()),
+        make("geometry_msgs/TwistWithCovariance", ros_twist(twist), twist_covariance.ravel()),
     )
     pack = message_templates.odometry_with_covariance(frame, child).packer()
     assert pack(stamp, pose, covariance.ravel().tolist(), twist, variances.tolist()) == serialized(expected)
@@ -112,7 +116,7 @@ def test_odometry_with_covariance_bytes_equal_those_of_rosbags(seed: int, stamp:
 @given(seeds, stamps, names)
 def test_imu_bytes_equal_those_of_rosbags(seed: int, stamp: Stamp, frame: str) -> None:
     rng = np.random.default_rng(seed)
-    turn, force = tuple(rng.normal(size=3).tolist()), tuple(rng.normal(size=3).tolist())
+    turn_rate, force = tuple(rng.normal(size=3).tolist()), tuple(rng.normal(size=3).tolist())
     unknown = np.zeros(9)
     unknown[0] = -1
     expected = make(
@@ -120,12 +124,12 @@ def test_imu_bytes_equal_those_of_rosbags(seed: int, stamp: Stamp, frame: str) -
         header(stamp, frame),
         make("geometry_msgs/Quaternion", 0.0, 0.0, 0.0, 1.0),
         unknown,
-        vector(*turn),
+        vector(*turn_rate),
         0.25 * np.eye(3).ravel(),
         vector(*force),
         0.5 * np.eye(3).ravel(),
     )
-    assert message_templates.imu(frame).packer()(stamp, turn, 0.25, force, 0.5) == serialized(expected)
+    assert message_templates.imu(frame).packer()(stamp, turn_rate, 0.25, force, 0.5) == serialized(expected)
 
 
 @given(seeds, stamps, names)
@@ -182,7 +186,7 @@ def test_particle_bytes_equal_those_of_rosbags(seed: int, stamp: Stamp, frame: s
 @given(seeds, st.lists(st.tuples(names, names, stamps), max_size=5))
 def test_transform_bytes_equal_those_of_rosbags(seed: int, links: list[tuple[str, str, Stamp]]) -> None:
     rng = np.random.default_rng(seed)
-    placed = [(*link, pose3(rng)) for link in links]
+    transforms_with_pose = [(*link, pose3(rng)) for link in links]
     transforms = [
         make(
             "geometry_msgs/TransformStamped",
@@ -190,9 +194,9 @@ def test_transform_bytes_equal_those_of_rosbags(seed: int, links: list[tuple[str
             child,
             make("geometry_msgs/Transform", vector(*pose.position), ros_pose(pose).orientation),
         )
-        for frame, child, stamp, pose in placed
+        for frame, child, stamp, pose in transforms_with_pose
     ]
-    assert encode.tf_message(placed) == serialized(make("tf2_msgs/TFMessage", transforms))
+    assert encode.tf_message(transforms_with_pose) == serialized(make("tf2_msgs/TFMessage", transforms))
 
 
 @given(seeds, stamps, names, st.integers(0, 9), st.integers(0, 9))

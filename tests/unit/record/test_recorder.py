@@ -1,4 +1,4 @@
-"""Tests of recorded logs with third-party readers."""
+"""Tests of the topics, messages, and metadata of recorded logs, read with other MCAP libraries."""
 
 import hashlib
 import io
@@ -57,7 +57,7 @@ def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def read(path: Path) -> dict[str, list[tuple[int, Any]]]:
-    """Return all messages by topic, with their times, decoded by rosbags."""
+    """All messages by topic, with their log times, decoded by rosbags."""
     found: dict[str, list[tuple[int, Any]]] = {}
     with AnyReader([path], default_typestore=humble()) as reader:
         for connection, time, data in reader.messages():
@@ -143,13 +143,13 @@ def test_the_frames_form_one_tree_under_map(read: dict[str, list[tuple[int, Any]
     assert {t.child_frame_id for t in read["/tf_static"][-1][1].transforms} == {"camera", "lidar", "rear lidar"}
 
 
-def test_logged_map_equals_that_of_the_robot(read: dict[str, list[tuple[int, Any]]]) -> None:
+def test_logged_map_equals_the_map_of_the_robot(read: dict[str, list[tuple[int, Any]]]) -> None:
     ((time, message),) = read["/map"]
-    given = sample_header().map
-    assert given is not None
+    grid = sample_header().map
+    assert grid is not None
     assert time == 0
-    assert (message.info.height, message.info.width) == given.shape
-    assert np.array_equal(message.data.reshape(given.shape), given.cells)
+    assert (message.info.height, message.info.width) == grid.shape
+    assert np.array_equal(message.data.reshape(grid.shape), grid.cells)
 
 
 def test_accepted_goal_is_published_at_its_pose(read: dict[str, list[tuple[int, Any]]]) -> None:
@@ -232,25 +232,25 @@ def test_external_stack_has_a_metadata_record() -> None:
     assert end["messages:/map"] == "1"
 
 
-def with_filter(run: list[Moment]) -> list[Moment]:
+def with_filtered_odometry(run: list[Moment]) -> list[Moment]:
     """Return the same run with a stack whose filtered odometry is 1 m ahead."""
-    found = []
+    moments_with_filter = []
     for moment in run:
-        own = [each for each in moment.readings if isinstance(each, Odometry) and each.sensor == "wheels"]
-        filtered = tuple(replace(each, pose=Pose2(each.pose.x + 1.0, *each.pose[1:])) for each in own)
-        found.append(replace(moment, decision=replace(moment.decision, odometry=filtered)))
-    return found
+        wheels = [each for each in moment.readings if isinstance(each, Odometry) and each.sensor == "wheels"]
+        filtered = tuple(replace(each, pose=Pose2(each.pose.x + 1.0, *each.pose[1:])) for each in wheels)
+        moments_with_filter.append(replace(moment, decision=replace(moment.decision, odometry=filtered)))
+    return moments_with_filter
 
 
 def test_filtered_odometry_of_the_stack_defines_the_odom_transform(tmp_path: Path) -> None:
     path = tmp_path / "run.mcap"
-    path.write_bytes(record(with_filter(RUN)))
+    path.write_bytes(record(with_filtered_odometry(RUN)))
     with AnyReader([path], default_typestore=humble()) as reader:
         messages = [(each.topic, reader.deserialize(data, each.msgtype)) for each, _, data in reader.messages()]
     wheels, filtered = ([m for topic, m in messages if topic == name] for name in ("/odom", "/odometry/filtered"))
     links = [t for topic, m in messages if topic == "/tf" for t in m.transforms if t.child_frame_id == "base_link"]
     assert len(wheels) == len(filtered) == len(links)
-    for one, other, link in zip(wheels, filtered, links, strict=True):
-        assert (other.header.frame_id, other.child_frame_id) == ("odom", "base_link")
-        assert other.header.stamp == link.header.stamp
-        assert other.pose.pose.position.x == link.transform.translation.x == one.pose.pose.position.x + 1.0
+    for wheel, fused, link in zip(wheels, filtered, links, strict=True):
+        assert (fused.header.frame_id, fused.child_frame_id) == ("odom", "base_link")
+        assert fused.header.stamp == link.header.stamp
+        assert fused.pose.pose.position.x == link.transform.translation.x == wheel.pose.pose.position.x + 1.0

@@ -1,4 +1,4 @@
-"""Tests that a log gives the same trace as the run."""
+"""Tests that the trace of a log is bit-identical to the trace of its run."""
 
 import dataclasses
 from pathlib import Path
@@ -20,7 +20,8 @@ HERE = Path(__file__).parent
 RESULT = '{"status": "pass"}'
 
 
-def recorded(path: Path, run: "list[Moment]", end: int) -> Trace:
+def record_run(path: Path, run: "list[Moment]", end: int) -> Trace:
+    """Write the log of a run, and return its trace."""
     builder = TraceBuilder(CLOCK)
     with Recorder(path, CLOCK, sample_header()) as recorder:
         for moment in run:
@@ -52,34 +53,34 @@ def assert_same(ours: Trace, theirs: Trace) -> None:
 @pytest.fixture(scope="module")
 def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("log") / "run.mcap"
-    recorded(path, list(moments(1.0)), 240)
+    record_run(path, list(moments(1.0)), 240)
     return path
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_replayed_log_gives_a_bit_identical_trace(tmp_path: Path, seed: int) -> None:
-    trace = recorded(tmp_path / "run.mcap", list(moments(2.0, seed)), 481)
+    trace = record_run(tmp_path / "run.mcap", list(moments(2.0, seed)), 481)
     assert_same(trace, read_log(tmp_path / "run.mcap").trace)
 
 
 @settings(max_examples=50, deadline=None)
-@given(run=runs, rest=st.integers(0, 10**7))
+@given(run=runs, remaining_ticks=st.integers(0, 10**7))
 def test_any_moments_are_replayed_exactly(
-    tmp_path_factory: pytest.TempPathFactory, run: list[Moment], rest: int
+    tmp_path_factory: pytest.TempPathFactory, run: list[Moment], remaining_ticks: int
 ) -> None:
     path = tmp_path_factory.mktemp("any") / "run.mcap"
-    end = rest + max((moment.tick for moment in run), default=0)
-    assert_same(recorded(path, run, end), read_log(path).trace)
+    end = remaining_ticks + max((moment.tick for moment in run), default=0)
+    assert_same(record_run(path, run, end), read_log(path).trace)
 
 
 def test_log_contains_the_case_and_facts_of_its_run(log: Path) -> None:
-    read, given_ = read_log(log), sample_header()
+    read, header = read_log(log), sample_header()
     assert read.complete
     assert read.result == RESULT
     for name in ("name", "seed", "case", "scenario", "robot_description", "files", "facts"):
-        assert getattr(read.header, name) == getattr(given_, name)
+        assert getattr(read.header, name) == getattr(header, name)
     assert read.header.case == CASE
-    assert read.header.mounts["camera"] == given_.mounts["camera"]
+    assert read.header.mounts["camera"] == header.mounts["camera"]
 
 
 def test_the_map_is_read_back_exactly(log: Path) -> None:

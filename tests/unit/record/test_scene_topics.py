@@ -1,4 +1,4 @@
-"""Tests of scene topics: each message is complete."""
+"""Tests of the topics with objects and zones, and of the frames of several robots."""
 
 import io
 from dataclasses import replace
@@ -62,15 +62,16 @@ def log_of_two_robots(folder: Path) -> Path:
 
 
 def groups(markers: list[Any]) -> set[tuple[str, str]]:
+    """Return namespace and text of the markers after the first, which deletes the previous markers."""
     return {(marker.ns, marker.text) for marker in markers[1:]}
 
 
 def test_objects_are_published_again_when_one_appears_or_disappears() -> None:
     square = [list(corner) for corner in SQUARE]
-    here = [spawned("gate", [square]), spawned("anna", [square], person=True)]
+    first_events = [spawned("gate", [square]), spawned("anna", [square], person=True)]
     mark = Event(0, EventKind.MARK, "box")
-    box, gone = spawned("box", [square, square[:3]]), Event(0, EventKind.OBJECT_REMOVED, "anna")
-    updates = markers_on("/simscen/things", (0, here), (24, []), (240, [box]), (480, [gone, mark]))
+    box, removed = spawned("box", [square, square[:3]]), Event(0, EventKind.OBJECT_REMOVED, "anna")
+    updates = markers_on("/simscen/things", (0, first_events), (24, []), (240, [box]), (480, [removed, mark]))
     assert [time for time, _ in updates] == [0.0, 1.0, 2.0]
     assert [{marker.header.frame_id for marker in markers[1:]} for _, markers in updates] == [
         {"object/gate", "object/anna"},
@@ -93,8 +94,8 @@ def test_object_with_an_invalid_outline_shows_only_its_name(parts: Any) -> None:
 
 
 def test_zones_are_published_again_when_one_is_switched() -> None:
-    def switch(region: str, kind: str, enabled: bool, **more: float) -> Event:
-        return Event(0, EventKind.ZONE_SWITCHED, region, {"filter": kind, "enabled": enabled, **more})
+    def switch(region: str, kind: str, enabled: bool, **data: float) -> Event:
+        return Event(0, EventKind.ZONE_SWITCHED, region, {"filter": kind, "enabled": enabled, **data})
 
     updates = markers_on(
         "/simscen/scene",
@@ -127,9 +128,9 @@ def test_frames_of_several_robots_are_in_one_tree(tmp_path: Path) -> None:
     reader = make_reader(stream, decoder_factories=[DecoderFactory()])
     for _, _, _, message in reader.iter_decoded_messages(["/a/tf", "/a/tf_static", "/object/tf", "/object/tf_static"]):
         parents |= {link.child_frame_id: link.header.frame_id for link in message.transforms}
-    for front in ("a/", "object_/"):
-        assert parents[f"{front}odom"] == parents[f"{front}base_link_truth"] == "map"
-        assert parents[f"{front}lidar"] == parents[f"{front}camera"] == f"{front}base_link"
+    for prefix in ("a/", "object_/"):
+        assert parents[f"{prefix}odom"] == parents[f"{prefix}base_link_truth"] == "map"
+        assert parents[f"{prefix}lidar"] == parents[f"{prefix}camera"] == f"{prefix}base_link"
 
 
 def test_mounts_and_scans_of_several_robots_are_read_without_their_prefix(tmp_path: Path) -> None:

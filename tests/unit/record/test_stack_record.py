@@ -1,4 +1,4 @@
-"""Tests of reading the log lines and facts that an external stack reported."""
+"""Tests of reading the log lines and the metadata record of an external stack."""
 
 from dataclasses import replace
 from pathlib import Path

@@ -40,11 +40,11 @@ def test_packer_writes_fields_and_keeps_constants() -> None:
 
 
 def test_fields_with_the_same_name_are_one_argument() -> None:
-    one, other = Template(prefix=b""), Template(prefix=b"")
-    one.slot("d", "value")
-    other.slot("i", "count")
-    other.slot("d", "value")
-    assert compile_packer((*one.parts, *other.parts))(0.5, 7) == struct.pack("<di4xd", 0.5, 7, 0.5)
+    first, second = Template(prefix=b""), Template(prefix=b"")
+    first.slot("d", "value")
+    second.slot("i", "count")
+    second.slot("d", "value")
+    assert compile_packer((*first.parts, *second.parts))(0.5, 7) == struct.pack("<di4xd", 0.5, 7, 0.5)
 
 
 def test_reader_reads_messages_of_the_template() -> None:

@@ -1,4 +1,4 @@
-"""Tests of the trace builder."""
+"""Tests of TraceBuilder, which collects the moments of a run in a trace."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -20,7 +20,7 @@ from simscen.record.trace_difference import first_difference
 RUN = list(moments(2.0))
 
 
-def traced(run: list[Moment], end: int = 480) -> Trace:
+def build_trace(run: list[Moment], end: int = 480) -> Trace:
     builder = TraceBuilder(CLOCK)
     for moment in run:
         builder.append(moment)
@@ -29,22 +29,22 @@ def traced(run: list[Moment], end: int = 480) -> Trace:
 
 @pytest.fixture(scope="module")
 def trace() -> Trace:
-    return traced(RUN)
+    return build_trace(RUN)
 
 
 def assert_poses(values: np.ndarray, expected: "list[tuple[float, ...]]") -> None:
-    """Positions to the last bit, headings to rounding."""
+    """Assert that positions are equal and that headings differ only by rounding."""
     rows = np.array(expected)
     assert np.array_equal(values[:, :2], rows[:, :2])
     assert np.abs(wrap_array(values[:, 2] - rows[:, 2])).max() < 1e-14
 
 
 def test_truth_is_sampled_at_moments_with_truth(trace: Trace) -> None:
-    true = [(m.tick, m.truth) for m in RUN if m.truth]
-    assert trace.truth.ticks.tolist() == trace.clearance.ticks.tolist() == [tick for tick, _ in true]
-    assert_poses(trace.truth.values, [truth.pose.plane for _, truth in true])
-    assert trace.velocity.values.tolist() == [list(truth.twist) for _, truth in true]
-    assert trace.clearance.values.ravel().tolist() == [truth.clearance for _, truth in true]
+    truths = [(m.tick, m.truth) for m in RUN if m.truth]
+    assert trace.truth.ticks.tolist() == trace.clearance.ticks.tolist() == [tick for tick, _ in truths]
+    assert_poses(trace.truth.values, [truth.pose.plane for _, truth in truths])
+    assert trace.velocity.values.tolist() == [list(truth.twist) for _, truth in truths]
+    assert trace.clearance.values.ravel().tolist() == [truth.clearance for _, truth in truths]
 
 
 def test_beliefs_carry_pose_and_upper_covariance(trace: Trace) -> None:
@@ -62,19 +62,19 @@ def test_odometry_of_the_first_sensor_is_used(trace: Trace) -> None:
 
 
 def test_command_at_any_beat_is_the_last_decision(trace: Trace) -> None:
-    held = trace.command.at(np.array([m.tick for m in RUN]))
-    assert held.tolist() == [list(m.decision.command) for m in RUN]
+    commands = trace.command.at(np.array([m.tick for m in RUN]))
+    assert commands.tolist() == [list(m.decision.command) for m in RUN]
 
 
 def test_object_pose_at_a_cycle_is_the_true_pose(trace: Trace) -> None:
-    seen = [(m.tick, m.truth.objects) for m in RUN if m.truth and m.truth.objects]
+    objects_by_tick = [(m.tick, m.truth.objects) for m in RUN if m.truth and m.truth.objects]
     assert list(trace.objects) == ["a box", "cart"]
     for name, samples in trace.objects.items():
-        held = samples.at(np.array([tick for tick, _ in seen]))
-        assert_poses(held, [objects[name].plane for _, objects in seen])
+        poses = samples.at(np.array([tick for tick, _ in objects_by_tick]))
+        assert_poses(poses, [objects[name].plane for _, objects in objects_by_tick])
 
 
-def test_scan_times_are_those_of_all_lidars(trace: Trace) -> None:
+def test_scan_times_include_all_lidars(trace: Trace) -> None:
     assert trace.scans.tolist() == [m.tick for m in RUN if any(isinstance(r, Scan) for r in m.readings)]
 
 
@@ -88,30 +88,30 @@ def test_plans_keep_their_tick_and_their_points(trace: Trace) -> None:
 def test_events_of_world_and_stack_are_kept_in_order() -> None:
     world, stack = Event(0, "fault.started", "lidar.off"), Event(0, "goal.accepted", "shelf", {"index": 0})
     moment = Moment(0, Truth(Pose3(), STOP, 1.0), (), Decision(STOP, events=(stack,)), (world,))
-    assert traced([moment]).events == (world, stack)
+    assert build_trace([moment]).events == (world, stack)
 
 
 def test_run_aborted_at_the_start_has_an_empty_trace() -> None:
-    trace = traced([], end=0)
+    trace = build_trace([], end=0)
     assert trace.truth.values.shape == (0, 3)
     assert trace.belief.values.shape == (0, 9)
     assert len(trace.scans) == len(trace.events) == trace.end == 0
 
 
 def test_odometry_is_from_the_first_sensor_of_the_robot_also_if_it_delivers_later(tmp_path: Path) -> None:
-    """As in the log, where the first sensor has the topic /odom."""
+    """In the log, the first sensor has the topic /odom."""
     header = replace(sample_header(), sensors={"slow": "Odometry", "fast": "Odometry"})
     readings = [("fast", 0), ("fast", 6), ("slow", 6), ("fast", 12), ("slow", 12)]
     decision = Decision(STOP)
     with Recorder(tmp_path / "run.mcap", CLOCK, header) as recorder:
         builder = TraceBuilder(CLOCK, recorder.robots[""].thinning)
         for tick in (0, 6, 12):
-            given = tuple(
+            tick_readings = tuple(
                 Odometry(name, tick, Pose2(1.0 if name == "slow" else 2.0, 0.0), STOP)
                 for name, at in readings
                 if at == tick
             )
-            moment = Moment(tick, None, given, decision)
+            moment = Moment(tick, None, tick_readings, decision)
             recorder.append(moment)
             builder.append(moment)
         recorder.close(12)

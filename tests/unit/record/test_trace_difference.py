@@ -21,7 +21,7 @@ def trace() -> Trace:
     return builder.finish(240)
 
 
-def changed(samples: Samples, row: int, column: int, by: float) -> Samples:
+def with_offset(samples: Samples, row: int, column: int, by: float) -> Samples:
     values = samples.values.copy()
     values[row, column] += by
     return Samples(samples.ticks, values)
@@ -35,25 +35,27 @@ def test_difference_of_one_bit_is_found_with_tick_and_field(trace: Trace) -> Non
     values = trace.truth.values.copy()
     values[4, 1] = np.nextafter(values[4, 1], 9)
     other = dataclasses.replace(trace, truth=Samples(trace.truth.ticks, values))
-    was, now = float(trace.truth.values[4, 1]), float(values[4, 1])
-    assert first_difference(trace, other) == f"tick 24 (t = 0.100 s): truth.y: {was!r} against {now!r}"
+    first_value, second_value = float(trace.truth.values[4, 1]), float(values[4, 1])
+    assert first_difference(trace, other) == f"tick 24 (t = 0.100 s): truth.y: {first_value!r} against {second_value!r}"
 
 
 def test_the_earliest_difference_is_reported(trace: Trace) -> None:
     other = dataclasses.replace(
-        trace, truth=changed(trace.truth, 9, 0, 1.0), odometry=changed(trace.odometry, 3, 2, 1.0)
+        trace, truth=with_offset(trace.truth, 9, 0, 1.0), odometry=with_offset(trace.odometry, 3, 2, 1.0)
     )
     assert (first_difference(trace, other) or "").startswith("tick 18 (t = 0.075 s): odometry.yaw: ")
 
 
 def test_at_the_same_tick_the_cause_is_reported(trace: Trace) -> None:
-    other = dataclasses.replace(trace, truth=changed(trace.truth, 4, 2, 1.0), belief=changed(trace.belief, 1, 0, 1.0))
+    other = dataclasses.replace(
+        trace, truth=with_offset(trace.truth, 4, 2, 1.0), belief=with_offset(trace.belief, 1, 0, 1.0)
+    )
     assert "truth.yaw" in (first_difference(trace, other) or "")
 
 
 def test_nan_does_not_differ_from_nan(trace: Trace) -> None:
-    blind = dataclasses.replace(trace, odometry=changed(trace.odometry, 2, 0, float("nan")))
-    assert first_difference(blind, blind) is None
+    with_nan = dataclasses.replace(trace, odometry=with_offset(trace.odometry, 2, 0, float("nan")))
+    assert first_difference(with_nan, with_nan) is None
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Tests of the comparison of runs between machines."""
+"""Tests of first_pose_difference, which compares runs on different machines with a tolerance."""
 
 import dataclasses
 import math
@@ -19,21 +19,21 @@ def trace() -> Trace:
     return builder.finish(240)
 
 
-def moved(trace: Trace, column: int, by: float) -> Trace:
+def with_moved_pose(trace: Trace, column: int, offset: float) -> Trace:
     values = trace.truth.values.copy()
-    values[4, column] += by
+    values[4, column] += offset
     return dataclasses.replace(trace, truth=Samples(trace.truth.ticks, values))
 
 
-@pytest.mark.parametrize(("column", "by"), [(0, 0.0), (0, 1e-12), (1, -9e-6), (2, 9e-6), (2, 2 * math.pi)])
-def test_runs_that_differ_by_rounding_are_equal(trace: Trace, column: int, by: float) -> None:
-    assert first_pose_difference(trace, moved(trace, column, by)) is None
+@pytest.mark.parametrize(("column", "offset"), [(0, 0.0), (0, 1e-12), (1, -9e-6), (2, 9e-6), (2, 2 * math.pi)])
+def test_runs_that_differ_by_rounding_are_equal(trace: Trace, column: int, offset: float) -> None:
+    assert first_pose_difference(trace, with_moved_pose(trace, column, offset)) is None
 
 
-@pytest.mark.parametrize(("column", "by"), [(0, 1.1e-5), (1, -1.0), (2, 1e-4), (0, math.nan)])
-def test_different_path_is_reported_with_its_tick(trace: Trace, column: int, by: float) -> None:
+@pytest.mark.parametrize(("column", "offset"), [(0, 1.1e-5), (1, -1.0), (2, 1e-4), (0, math.nan)])
+def test_different_path_is_reported_with_its_tick(trace: Trace, column: int, offset: float) -> None:
     assert "tick 24 (t = 0.100 s): the true pose differs by" in str(
-        first_pose_difference(trace, moved(trace, column, by))
+        first_pose_difference(trace, with_moved_pose(trace, column, offset))
     )
 
 

@@ -1,4 +1,4 @@
-"""Tests of the thinning of recorded data."""
+"""Tests of Thinning and Throttle, which reduce the rate of recorded data."""
 
 from simscen.core.geometry import Pose2, Pose3
 from simscen.core.geometry.kinematics import STOP, Twist
@@ -25,16 +25,20 @@ def test_only_odometry_of_the_first_sensor_is_kept() -> None:
 
 def test_stationary_objects_are_kept_once_a_second() -> None:
     thinning = Thinning(240)
-    still = [thinning.objects_to_keep(tick, Truth(Pose3(), STOP, 1.0, {"box": Pose3()})) for tick in range(0, 480, 6)]
-    assert sum(map(len, still)) == 2
+    kept_objects = [
+        thinning.objects_to_keep(tick, Truth(Pose3(), STOP, 1.0, {"box": Pose3()})) for tick in range(0, 480, 6)
+    ]
+    assert sum(map(len, kept_objects)) == 2
 
 
 def test_each_stationary_object_is_kept_one_second_after_its_last_sample() -> None:
     thinning, box, both = Thinning(240), {"box": Pose3()}, {"box": Pose3(), "cart": Pose3()}
-    seen = [(0, box), *((tick, both) for tick in range(6, 600, 6))]
-    kept = {tick: set(thinning.objects_to_keep(tick, Truth(Pose3(), STOP, 1.0, objects))) for tick, objects in seen}
+    samples = [(0, box), *((tick, both) for tick in range(6, 600, 6))]
+    kept_names = {
+        tick: set(thinning.objects_to_keep(tick, Truth(Pose3(), STOP, 1.0, objects))) for tick, objects in samples
+    }
     expected = {0: {"box"}, 6: {"cart"}, 240: {"box"}, 246: {"cart"}, 480: {"box"}, 486: {"cart"}}
-    assert {tick: names for tick, names in kept.items() if names} == expected
+    assert {tick: names for tick, names in kept_names.items() if names} == expected
 
 
 def test_moving_objects_are_always_kept() -> None:

@@ -1,4 +1,4 @@
-"""Whole runs of small scenarios, in this process; and `search_plants.py`, which the tests of this folder share."""
+"""The fixture `play`, which runs a small scenario in this process. Makes `search_plants.py` importable."""
 
 import sys
 from pathlib import Path
@@ -29,13 +29,16 @@ pass: [{goals_reached: {}}]
 
 @pytest.fixture(scope="module")
 def play(tmp_path_factory: pytest.TempPathFactory):
-    """Runs a scenario given as the lines that it has besides or instead of the usual ones; returns its trace."""
+    """Return a function that runs SCENARIO and returns its trace.
 
-    def run(extra: str = "", seed: int = 1, room: str = ROOM, **instead: str):
+    The keyword arguments replace or add top-level keys, and `extra` is appended to the text of the scenario.
+    """
+
+    def run(extra: str = "", seed: int = 1, room: str = ROOM, **replaced_keys: str):
         folder = tmp_path_factory.mktemp("play")
         lines = {line.split(":")[0]: line for line in SCENARIO.splitlines()}
-        lines |= {key: f"{key}: {value}" for key, value in instead.items()}
-        if "robots" in instead:
+        lines |= {key: f"{key}: {value}" for key, value in replaced_keys.items()}
+        if "robots" in replaced_keys:
             del lines["robot"], lines["goals"]
         (folder / "room.world.yaml").write_text(room)
         (folder / "a.scenario.yaml").write_text("\n".join(lines.values()) + "\n" + extra)

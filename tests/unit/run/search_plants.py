@@ -1,4 +1,4 @@
-"""Plants of eight parameters between 0 and 1, of which 0.4 % of the values fail."""
+"""Test functions of eight parameters between 0 and 1 that replace runs: 0.4 % of the points fail."""
 
 from collections.abc import Callable
 
@@ -13,7 +13,7 @@ PLANTS: dict[str, Callable[[Array], Array]] = {
     "region": lambda points: -np.linalg.norm(points[..., :3] - CENTER, axis=-1),
     "product": lambda points: points[..., :4].prod(axis=-1),
 }
-"""A run fails if the value is above the threshold. In the region and the product, some parameters do not matter."""
+"""A point fails if its value is above the threshold. Some parameters have no effect in `region` and `product`."""
 
 
 def failure_threshold(plant: Callable[[Array], Array]) -> float:

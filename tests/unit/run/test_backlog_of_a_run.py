@@ -1,4 +1,4 @@
-"""Test that data of packages is recorded immediately."""
+"""Test that the moments of a run with plug-ins are recorded immediately."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -23,34 +23,34 @@ pass: [collisions: {max: 0}]
 """
 
 
-class Lag:
-    """Return the maximum number of moments that the trace lacks when a listener gets a moment."""
+class RecordingLag:
+    """Listener that measures how many ticks the recording in the trace is behind the listeners."""
 
     def __init__(self) -> None:
-        self.most = self.written = 0
+        self.max_lag = self.recorded_tick = 0
 
-    def attach(self, rig: Any, own: Any) -> Any:
-        (trace,) = own
+    def attach(self, rig: Any, listeners: Any) -> Any:
+        (trace,) = listeners
         write = trace.append
 
         def append(moment: Moment) -> None:
-            self.written = moment.tick
+            self.recorded_tick = moment.tick
             write(moment)
 
         trace.append = append
         return (self,)
 
     def append(self, moment: Moment) -> None:
-        self.most = max(self.most, moment.tick - self.written)
+        self.max_lag = max(self.max_lag, moment.tick - self.recorded_tick)
 
 
-@pytest.mark.parametrize("others", [False, True])
-def test_moments_are_recorded_immediately_if_a_run_has_plugins(tmp_path: Path, others: bool) -> None:
+@pytest.mark.parametrize("has_plugins", [False, True])
+def test_moments_are_recorded_immediately_if_a_run_has_plugins(tmp_path: Path, has_plugins: bool) -> None:
     file = tmp_path / "short.scenario.yaml"
     file.write_text(SCENARIO)
     package = RegisteredType("planner", "theirs", "theirs:Planner", distribution="theirs", version="1.0")
-    prepared = replace(prepare(load_scenario(file, tmp_path)), plugins=(package,) if others else ())
-    lag = Lag()
+    prepared = replace(prepare(load_scenario(file, tmp_path)), plugins=(package,) if has_plugins else ())
+    lag = RecordingLag()
     run = simulate(prepared, attach=lag.attach)
-    assert (lag.most == 0) == others
+    assert (lag.max_lag == 0) == has_plugins
     assert run.trace.truth.ticks[-1] == run.trace.end

@@ -1,4 +1,4 @@
-"""Tests of a base with late and lost commands."""
+"""Tests of the link between stack and base: command rate and command timeout."""
 
 from simscen.core.geometry.kinematics import STOP, Twist
 from simscen.run.faults.command_link import CommandLink
@@ -8,8 +8,8 @@ GO, FAST = Twist(0.3), Twist(0.5)
 
 def test_commands_are_sent_at_the_rate_and_immediately_when_they_change():
     link = CommandLink(12, 120)
-    wanted = [GO] * 15 + [STOP] * 15
-    assert [tick for tick, command in enumerate(wanted) if link.send(tick, command)] == [0, 12, 15, 24]
+    commands = [GO] * 15 + [STOP] * 15
+    assert [tick for tick, command in enumerate(commands) if link.send(tick, command)] == [0, 12, 15, 24]
 
 
 def test_base_without_commands_keeps_the_last_one_and_stops_after_its_timeout():

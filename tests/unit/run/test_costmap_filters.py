@@ -1,4 +1,4 @@
-"""Tests of switching zones of costmap filters."""
+"""Tests of switching the zones of costmap filters on and off during a run."""
 
 import numpy as np
 import pytest
@@ -19,45 +19,46 @@ def filters(masks=None, **stack):
     return CostmapFilters(StackSpec.model_validate(stack), REGIONS, masks or FilterMasks())
 
 
-def order(filters, what, enabled, region=None, limit=None):
-    text = ZoneSwitch(what, enabled, region, limit)
-    return filters.rejection_reason(text) or filters.switch(text)
+def switch(filters, kind, enabled, region=None, limit=None):
+    """Return the names of the switched zones, or the reason why the switch is rejected."""
+    request = ZoneSwitch(kind, enabled, region, limit)
+    return filters.rejection_reason(request) or filters.switch(request)
 
 
 def test_zones_keep_their_order_when_they_are_switched():
-    some = filters(**STACK)
-    assert some.zones.keepout == (WET,)
-    assert order(some, "keepout", True, "dry") == ("dry",)
-    assert some.zones.keepout == (WET, DRY)
-    assert order(some, "keepout", False, "wet") == ("wet",)
-    assert some.zones.keepout == (DRY,)
-    assert order(some, "keepout", True, "wet") == ("wet",)
-    assert some.zones.keepout == (WET, DRY)
+    zone_filters = filters(**STACK)
+    assert zone_filters.zones.keepout == (WET,)
+    assert switch(zone_filters, "keepout", True, "dry") == ("dry",)
+    assert zone_filters.zones.keepout == (WET, DRY)
+    assert switch(zone_filters, "keepout", False, "wet") == ("wet",)
+    assert zone_filters.zones.keepout == (DRY,)
+    assert switch(zone_filters, "keepout", True, "wet") == ("wet",)
+    assert zone_filters.zones.keepout == (WET, DRY)
 
 
 def test_last_speed_limit_applies():
-    some = filters(**STACK)
-    assert some.zones.speed == ((SLOW, 0.2),)
-    order(some, "speed", True, "slow", 0.1)
-    assert some.zones.speed == ((SLOW, 0.1),)
-    order(some, "speed", False, "slow")
-    assert some.zones.speed == ()
-    order(some, "speed", True, "slow")
-    assert some.zones.speed == ((SLOW, 0.1),)
+    zone_filters = filters(**STACK)
+    assert zone_filters.zones.speed == ((SLOW, 0.2),)
+    switch(zone_filters, "speed", True, "slow", 0.1)
+    assert zone_filters.zones.speed == ((SLOW, 0.1),)
+    switch(zone_filters, "speed", False, "slow")
+    assert zone_filters.zones.speed == ()
+    switch(zone_filters, "speed", True, "slow")
+    assert zone_filters.zones.speed == ((SLOW, 0.1),)
 
 
 def test_switching_a_whole_filter_includes_its_mask_and_restores_its_zones():
-    some = filters(FilterMasks(MASK), keepout=["wet", "dry"])
-    order(some, "keepout", False, "dry")
-    assert order(some, "keepout", False) == ("wet", "")
-    assert (some.zones.keepout, some.zones.masks.keepout) == ((), None)
-    assert order(some, "keepout", True) == ("wet", "")
-    assert some.zones.keepout == (WET,)
-    assert some.zones.masks.keepout is MASK
+    zone_filters = filters(FilterMasks(MASK), keepout=["wet", "dry"])
+    switch(zone_filters, "keepout", False, "dry")
+    assert switch(zone_filters, "keepout", False) == ("wet", "")
+    assert (zone_filters.zones.keepout, zone_filters.zones.masks.keepout) == ((), None)
+    assert switch(zone_filters, "keepout", True) == ("wet", "")
+    assert zone_filters.zones.keepout == (WET,)
+    assert zone_filters.zones.masks.keepout is MASK
 
 
 @pytest.mark.parametrize(
-    ("text", "what", "enabled", "region", "limit"),
+    ("reason", "kind", "enabled", "region", "limit"),
     [
         ("`wet` was on already", "keepout", True, "wet", None),
         ("`dry` was off already", "keepout", False, "dry", None),
@@ -66,12 +67,12 @@ def test_switching_a_whole_filter_includes_its_mask_and_restores_its_zones():
         ("the stack's keepout filter was on already", "keepout", True, None, None),
     ],
 )
-def test_switch_without_effect_returns_the_reason(text, what, enabled, region, limit):
-    assert order(filters(**STACK), what, enabled, region, limit) == text
+def test_switch_without_effect_returns_the_reason(reason, kind, enabled, region, limit):
+    assert switch(filters(**STACK), kind, enabled, region, limit) == reason
 
 
 def test_empty_filter_and_zones_of_a_disabled_filter_cannot_be_switched():
-    assert order(filters(), "speed", False) == "the stack's speed filter has no zone and no mask"
-    some = filters(**STACK)
-    order(some, "keepout", False)
-    assert order(some, "keepout", True, "dry") == "the stack's keepout filter is off as a whole"
+    assert switch(filters(), "speed", False) == "the stack's speed filter has no zone and no mask"
+    zone_filters = filters(**STACK)
+    switch(zone_filters, "keepout", False)
+    assert switch(zone_filters, "keepout", True, "dry") == "the stack's keepout filter is off as a whole"

@@ -1,4 +1,4 @@
-"""The line of the scenario in which a criterion is written."""
+"""Tests of the line number of each criterion in a result."""
 
 from pathlib import Path
 
@@ -17,10 +17,10 @@ pass:
 
 
 def test_criterion_of_a_base_file_has_line_0(tmp_path: Path) -> None:
-    """Line 6 of the scenario is another one than line 6 of its base."""
+    """The result names only the scenario file, so a line of the base file would mislead."""
     (tmp_path / "base.yaml").write_text(BASE)
     (tmp_path / "a.scenario.yaml").write_text("extends: base.yaml\n\n\nname: a\n")
     (tmp_path / "b.scenario.yaml").write_text("extends: base.yaml\npass:\n  - collisions: {max: 0}\n")
     files = (tmp_path / f"{name}.scenario.yaml" for name in ("a", "b"))
-    (extended, own) = (simulate(prepare(load_scenario(file, tmp_path)), 1) for file in files)
-    assert (extended.result.lines, own.result.lines) == ((0,), (3,))
+    (inherited, overridden) = (simulate(prepare(load_scenario(file, tmp_path)), 1) for file in files)
+    assert (inherited.result.lines, overridden.result.lines) == ((0,), (3,))

@@ -41,11 +41,11 @@ def test_run_ends_soon_after_navigation_with_a_truth_sample_at_all_rates(play, t
 @pytest.mark.parametrize(("truth_rate", "time_limit"), [(20, "110 ms"), (40, "101 ms"), (240, "100 ms"), (20, "60 ms")])
 @pytest.mark.parametrize("robots", [1, 2])
 def test_run_ends_exactly_at_its_time_limit_with_a_truth_sample(play, truth_rate, time_limit, robots):
-    instead = {"goals": "[]", "pass": "[{collisions: {max: 0}}]"}
+    keys = {"goals": "[]", "pass": "[{collisions: {max: 0}}]"}
     if robots == 2:
-        del instead["goals"]
-        instead |= {"robots": "{a: {pose: {x: 1, y: 1}}, b: {pose: {x: 3, y: 1}, goals: [{pose: {x: 7, y: 5}}]}}"}
-    trace = play(time_limit=time_limit, physics=f"{{truth_rate: {truth_rate} Hz}}", **instead)
+        del keys["goals"]
+        keys |= {"robots": "{a: {pose: {x: 1, y: 1}}, b: {pose: {x: 3, y: 1}, goals: [{pose: {x: 7, y: 5}}]}}"}
+    trace = play(time_limit=time_limit, physics=f"{{truth_rate: {truth_rate} Hz}}", **keys)
     (ended,) = trace.of_kind("run.ended")
     limit = round(float(time_limit.removesuffix(" ms")) / 1000 * 240)
     assert ended.name == "time limit"

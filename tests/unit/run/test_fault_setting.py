@@ -1,4 +1,4 @@
-"""Tests of the readings that faults compute with a hypothetical sensor."""
+"""Tests of HypotheticalSensor, which computes what a sensor would measure at the current pose."""
 
 import math
 from types import SimpleNamespace

@@ -1,4 +1,4 @@
-"""The garbage collector hardly runs during a run, unless plug-ins take part."""
+"""Tests of the garbage collection threshold, which is higher during runs without plug-ins."""
 
 import gc
 from dataclasses import replace
@@ -21,8 +21,8 @@ pass: [collisions: {max: 0}]
 """
 
 
-class Begun(Exception):
-    """The run would begin now."""
+class SimulationStarted(Exception):
+    """Raised in place of the simulation; contains the threshold of the garbage collector."""
 
 
 @pytest.fixture
@@ -32,19 +32,19 @@ def thresholds():
     gc.set_threshold(*before)
 
 
-@pytest.mark.parametrize("others", [False, True])
+@pytest.mark.parametrize("has_plugins", [False, True])
 def test_garbage_collection_threshold_is_not_changed_if_a_run_has_plugins(
-    thresholds: tuple[int, int, int], others: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    thresholds: tuple[int, int, int], has_plugins: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def stop(*_: object, **__: object) -> None:
-        raise Begun(gc.get_threshold()[0])
+        raise SimulationStarted(gc.get_threshold()[0])
 
     monkeypatch.setattr(run_files, "simulate", stop)
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
     package = RegisteredType("planner", "theirs", "theirs:Planner", distribution="theirs", version="1.0")
     prepared = replace(
-        prepare(load_scenario(tmp_path / "a.scenario.yaml", tmp_path)), plugins=(package,) if others else ()
+        prepare(load_scenario(tmp_path / "a.scenario.yaml", tmp_path)), plugins=(package,) if has_plugins else ()
     )
-    with pytest.raises(Begun) as begun:
+    with pytest.raises(SimulationStarted) as raised:
         run_files.execute_run(prepared, 1, tmp_path, (), lambda *_: None)
-    assert begun.value.args == ((thresholds[0] if others else run_files.GC_THRESHOLD),)
+    assert raised.value.args == ((thresholds[0] if has_plugins else run_files.GC_THRESHOLD),)

@@ -1,4 +1,4 @@
-"""Test of default goal tolerances."""
+"""Test of the tolerances of goals that do not specify any."""
 
 from pathlib import Path
 
@@ -17,10 +17,10 @@ pass: [{collisions: {max: 0}}]
 """
 
 
-def test_goals_without_tolerances_have_those_of_the_stack(tmp_path: Path) -> None:
+def test_goals_without_tolerances_have_the_tolerances_of_the_stack(tmp_path: Path) -> None:
     file = tmp_path / "a.scenario.yaml"
     file.write_text(SCENARIO)
     loaded = load_scenario(file, tmp_path)
     goals = [*scenario_goals(loaded.spec), *event_goals(loaded).values()]
-    found = [(goal.xy_tolerance, goal.yaw_tolerance) for goal in goals]
-    assert found == [(0.31, 0.17), (0.1, 0.2), (0.31, 0.17)]
+    tolerances = [(goal.xy_tolerance, goal.yaw_tolerance) for goal in goals]
+    assert tolerances == [(0.31, 0.17), (0.1, 0.2), (0.31, 0.17)]

@@ -1,4 +1,4 @@
-"""Tests of the options for the files of runs."""
+"""Tests of the options that select which files of a run are kept."""
 
 from pathlib import Path
 

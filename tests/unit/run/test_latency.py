@@ -1,4 +1,4 @@
-"""Tests of latency of sensors and stack in a run."""
+"""Tests of the latency of sensors and the stack in a run."""
 
 from pathlib import Path
 
@@ -38,6 +38,7 @@ sensors:
 
 
 def moments(tmp_path: Path, beats: int, stack: str = "", lidar: str = "", latency: str = "") -> list:
+    """Return the first moments of a run; the texts are added to the stack, the lidar, and the robot file."""
     (tmp_path / "own.robot.yaml").write_text(ROBOT.format(lidar=lidar, latency=latency))
     file = tmp_path / "own.scenario.yaml"
     file.write_text(SCENARIO.format(stack=stack))
@@ -45,45 +46,46 @@ def moments(tmp_path: Path, beats: int, stack: str = "", lidar: str = "", latenc
     rig = assemble(prepared, 1)
     (agent,) = rig.robots
     agent.stack.start(prepared.estimate, prepared.case.goals)
-    taken = []
+    taken_moments = []
     for _ in range(beats):
         tick = rig.simulation.tick
         agent.observe(tick)
         agent.decide(tick)
-        taken.append(agent.moment)
+        taken_moments.append(agent.moment)
         agent.drive()
         rig.simulation.step(agent.schedule.ticks_until_next(tick))
-    return taken
+    return taken_moments
 
 
-def lateness(taken: list, kind: type) -> set[int]:
-    return {moment.tick - one.tick for moment in taken for one in moment.readings if type(one) is kind}
+def latencies(run: list, kind: type) -> set[int]:
+    """Return the latencies in ticks of all readings of the type `kind`."""
+    return {moment.tick - reading.tick for moment in run for reading in moment.readings if type(reading) is kind}
 
 
 def test_delayed_readings_keep_the_tick_of_their_measurement(tmp_path: Path) -> None:
-    taken = moments(tmp_path, 60, lidar=", latency: 30 ms")
-    assert lateness(taken, Scan) == {7}
-    assert lateness(taken, Odometry) == {0}
+    run = moments(tmp_path, 60, lidar=", latency: 30 ms")
+    assert latencies(run, Scan) == {7}
+    assert latencies(run, Odometry) == {0}
 
 
 def test_latencies_of_the_robot_apply_if_the_scenario_requests_them(tmp_path: Path) -> None:
     latency = "latency: {planner: 100 ms, controller: 10 ms, sensors: {lidar: 50 ms, odom: 10 ms}}"
-    taken = moments(tmp_path, 60, ", latency: robot", ", latency: 30 ms", latency)
-    assert lateness(taken, Scan) == {12}
-    assert lateness(taken, Odometry) == {0, 2}  # the truth of the localizer is never late
-    first = next(moment.tick for moment in taken if moment.decision.command.vx > 0)
-    assert first == 12 + 24 + 2  # it begins when its lidar has been heard
-    unasked = moments(tmp_path, 60, "", ", latency: 30 ms", latency)
-    assert lateness(unasked, Scan) == {7}
-    assert next(moment.tick for moment in unasked if moment.decision.command.vx > 0) == 12
+    run = moments(tmp_path, 60, ", latency: robot", ", latency: 30 ms", latency)
+    assert latencies(run, Scan) == {12}
+    assert latencies(run, Odometry) == {0, 2}  # the ground truth for the localizer has no latency
+    first = next(moment.tick for moment in run if moment.decision.command.vx > 0)
+    assert first == 12 + 24 + 2  # the robot starts after the first scan
+    without_request = moments(tmp_path, 60, "", ", latency: 30 ms", latency)
+    assert latencies(without_request, Scan) == {7}
+    assert next(moment.tick for moment in without_request if moment.decision.command.vx > 0) == 12
 
 
-@pytest.mark.parametrize("given", [", latency: {}", ", latency: robot", ", latency: {planner: 0 s, controller: 1 ms}"])
-def test_zero_latency_is_bit_identical_to_no_latency(tmp_path: Path, given: str) -> None:
-    plain, zero = moments(tmp_path, 80), moments(tmp_path, 80, given, ", latency: 0 s")
-    for one, other in zip(plain, zero, strict=True):
-        assert (one.tick, one.truth, one.decision.command) == (other.tick, other.truth, other.decision.command)
-        assert one.decision.events == other.decision.events
+@pytest.mark.parametrize("stack", [", latency: {}", ", latency: robot", ", latency: {planner: 0 s, controller: 1 ms}"])
+def test_zero_latency_is_bit_identical_to_no_latency(tmp_path: Path, stack: str) -> None:
+    plain, zero = moments(tmp_path, 80), moments(tmp_path, 80, stack, ", latency: 0 s")
+    for moment, other in zip(plain, zero, strict=True):
+        assert (moment.tick, moment.truth, moment.decision.command) == (other.tick, other.truth, other.decision.command)
+        assert moment.decision.events == other.decision.events
 
 
 def test_latency_of_a_missing_sensor_is_refused(tmp_path: Path) -> None:
@@ -98,6 +100,6 @@ def test_delayed_readings_keep_their_order() -> None:
         def read(self, tick: int) -> Odometry:
             return Odometry("s", tick, None, None)
 
-    senses = SensorSuite([Sensor()], {"s": 10})
-    assert senses.periods_and_latencies == ((4, 10),)
-    assert [one.tick for tick in range(30) for one in senses.read(tick)] == [0, 4, 8, 12, 16]
+    suite = SensorSuite([Sensor()], {"s": 10})
+    assert suite.periods_and_latencies == ((4, 10),)
+    assert [reading.tick for tick in range(30) for reading in suite.read(tick)] == [0, 4, 8, 12, 16]

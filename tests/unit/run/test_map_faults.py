@@ -22,23 +22,23 @@ pass: [{goals_reached: {}}]
 
 
 @pytest.fixture
-def two(tmp_path: Path):
-    """Two robots, the second with some faults."""
+def prepare_two_robots(tmp_path: Path):
+    """Return a function that prepares a scenario of two robots; the second has the given faults."""
 
-    def prepared(faults: str = "") -> PreparedScenario:
+    def prepare_with(faults: str = "") -> PreparedScenario:
         (tmp_path / "a.scenario.yaml").write_text(SCENARIO.replace("FAULTS", faults))
         return prepare(load_scenario(tmp_path / "a.scenario.yaml", tmp_path))
 
-    return prepared
+    return prepare_with
 
 
-def test_robots_without_map_faults_use_the_prepared_scenario(two) -> None:
-    prepared = two()
+def test_robots_without_map_faults_use_the_prepared_scenario(prepare_two_robots) -> None:
+    prepared = prepare_two_robots()
     assert apply_map_faults(prepared, seed=1) is prepared
 
 
-def test_only_the_robot_with_a_map_fault_gets_another_map(two) -> None:
-    prepared = two(", faults: [{sensor: map, shift: {x: 10 cm}}]")
+def test_only_the_robot_with_a_map_fault_gets_another_map(prepare_two_robots) -> None:
+    prepared = prepare_two_robots(", faults: [{sensor: map, shift: {x: 10 cm}}]")
     run = apply_map_faults(prepared, seed=1)
     assert run.robots["a"] is prepared.robots["a"]
     assert run.robots["b"].map_faults == (0,)

@@ -1,4 +1,4 @@
-"""The digest of a plug-in follows its files, also within one process (`--watch`)."""
+"""Test that the fingerprint of a plug-in follows changes of its files within one process (`--watch`)."""
 
 from simscen.run.reproducibility import plugin_fingerprints
 from simscen.spec.registry import RegisteredType

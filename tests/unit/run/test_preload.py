@@ -1,4 +1,4 @@
-"""Tests that the fork server imports everything that runs need."""
+"""Tests that the fork server imports all modules that runs need, before the first run."""
 
 import subprocess
 import sys
@@ -30,7 +30,7 @@ loaded = load_scenario(folder / "a.scenario.yaml", folder)
 job = Job(0, loaded, loaded.key(1), folder, 60.0)
 fork_server_main._warm_up(job)
 before = set(sys.modules)
-static_layer._unrotated_cells = None  # what a fork need not compute any more
+static_layer._unrotated_cells = None  # cached by the warm-up, so a run must not call it
 assert fork_server_main._execute(job, lambda seconds: None)["outcome"] == "passed"
 print("late:", *sorted(name for name in set(sys.modules) - before if name.split(".")[0] in ("simscen", "ompl", "PIL")))
 """
@@ -38,22 +38,22 @@ print("late:", *sorted(name for name in set(sys.modules) - before if name.split(
 
 def test_run_after_the_warm_up_imports_no_modules_and_computes_no_walls(tmp_path: Path) -> None:
     (tmp_path / "a.scenario.yaml").write_text(SCENARIO)
-    expected = subprocess.run(
+    result = subprocess.run(
         [sys.executable, "-c", PROGRAM, str(tmp_path)], capture_output=True, text=True, check=True, timeout=120
     )
-    assert "late:\n" in expected.stdout
+    assert "late:\n" in result.stdout
 
 
 def test_components_of_plugins_are_not_preloaded() -> None:
-    class Theirs(Component):
-        component = "nowhere.at_all:Theirs"
+    class PluginComponent(Component):
+        component = "missing_package.module:PluginComponent"
 
-    class Ours(Component):
+    class ShippedComponent(Component):
         component = "simscen.sensors.imu:ImuSensor"
-        inner: Theirs = Theirs()
+        inner: PluginComponent = PluginComponent()
 
-    assert [found.component for found in fork_server_main._components([{"a": (Ours(),)}])] == [
-        Ours.component,
-        Theirs.component,
+    assert [found.component for found in fork_server_main._components([{"a": (ShippedComponent(),)}])] == [
+        ShippedComponent.component,
+        PluginComponent.component,
     ]
-    assert list(fork_server_main.shipped_modules([Ours(), Theirs()])) == ["simscen.sensors.imu"]
+    assert list(fork_server_main.shipped_modules([ShippedComponent(), PluginComponent()])) == ["simscen.sensors.imu"]

@@ -1,4 +1,4 @@
-"""Tests of published robots: packages, arguments, and includes of xacro."""
+"""Tests of robots that are published as ROS packages: packages, arguments, and includes of xacro files."""
 
 import pytest
 from pydantic import ValidationError
@@ -64,7 +64,11 @@ f 2 3 4
 
 @pytest.fixture
 def published(tmp_path):
-    """A robot of two packages in their own repositories, and its body as `more` lines of its *.robot.yaml make it."""
+    """Return a function that loads the body of a robot from two packages in different repositories.
+
+    `more` are further lines of its *.robot.yaml, `parts` is the folder of the second package, and `edit` changes
+    the text of the xacro file.
+    """
 
     def body(more="", mesh="package://cart_parts/meshes/plate.obj", parts="repo/cart_parts", world_path=(), edit=str):
         files = {
@@ -85,15 +89,17 @@ def published(tmp_path):
 
 @pytest.fixture
 def refusal(published):
-    def refusal(*args, **more):
+    """Return a function that returns the first problem of a robot that cannot be loaded."""
+
+    def load(*args, **more):
         with pytest.raises(InvalidInput) as caught:
             published(*args, **more)
         return caught.value.problems[0]
 
-    return refusal
+    return load
 
 
-def test_a_package_beside_the_robots_own_is_found(published):
+def test_a_package_beside_the_package_of_the_robot_is_found(published):
     assert [wheel.y for wheel in published().wheels] == [0.2, -0.2]
 
 
@@ -121,12 +127,12 @@ def test_missing_package_is_reported_at_its_line(refusal):
 
 
 def test_all_missing_packages_are_reported_at_once(published):
-    def also(text):
+    def add_includes(text):
         find = '<xacro:include filename="$(find {})/x.xacro"/>'
         return text.replace("<link", find.format("sensors") + find.format("cart_parts") + "<link", 1)
 
     with pytest.raises(InvalidInput) as caught:
-        published(parts="vendor/parts", edit=also)
+        published(parts="vendor/parts", edit=add_includes)
     assert [problem.message for problem in caught.value.problems] == [
         "$(find cart_parts): there is no package 'cart_parts'",
         "$(find sensors): there is no package 'sensors'",

@@ -1,4 +1,4 @@
-"""The command that repeats a run works from where it is printed."""
+"""Tests of the printed command that repeats a run, and of the displayed paths."""
 
 import shlex
 from dataclasses import replace
@@ -22,8 +22,8 @@ def test_command_contains_the_relative_path_and_all_options(tmp_path, monkeypatc
     (tmp_path / "sub/a.scenario.yaml").write_text(TEXT)
     monkeypatch.chdir(tmp_path / "models")
     scenario = load_scenario(tmp_path / "sub/a.scenario.yaml", tmp_path, [tmp_path / "models"])
-    text = shlex.split(repeat_command(replace(scenario, lenient=True), 1))
-    assert text[2:] == ["../sub/a.scenario.yaml", "--seed", "1", "--root", "..", "--world-path", ".", "--lenient"]
+    words = shlex.split(repeat_command(replace(scenario, lenient=True), 1))
+    assert words[2:] == ["../sub/a.scenario.yaml", "--seed", "1", "--root", "..", "--world-path", ".", "--lenient"]
 
 
 def test_displayed_path_is_absolute_if_that_is_shorter(tmp_path, monkeypatch):

@@ -1,4 +1,4 @@
-"""Tests of the digest of a run, which includes all inputs."""
+"""Tests of the digests of a run and of its scenario, which depend on all files that the run reads."""
 
 import shutil
 from collections.abc import Callable
@@ -101,7 +101,7 @@ Digest = Callable[..., str]
 
 
 def write_project(folder: Path) -> Path:
-    """Write a scenario that reads everything a scenario can."""
+    """Write a scenario that reads a file of each kind that scenarios can refer to."""
     for name, text in FILES.items():
         (folder / name).parent.mkdir(parents=True, exist_ok=True)
         (folder / name).write_text(text)
@@ -110,7 +110,7 @@ def write_project(folder: Path) -> Path:
 
 
 def digests(project: Path, *world_path: str, lenient: bool = False) -> ScenarioDigests:
-    """Return the digests as `simscen run` makes them."""
+    """Return the digests that `simscen run` computes."""
     folders = [project / folder for folder in world_path or ("models",)]
     file = project / "p/a.scenario.yaml"
     (loaded,), _ = load_selection([file], project / "p", folders, lenient, Selection())
@@ -136,13 +136,13 @@ def unchanged(home: Path) -> ScenarioDigests:
 
 @pytest.fixture
 def project(home: Path, unchanged: ScenarioDigests) -> Path:
-    """A scenario that reads everything a scenario can, without the changes of earlier tests."""
+    """The folder of the scenario, without the changes of earlier tests."""
     shutil.rmtree(home)
     return write_project(home)
 
 
 @pytest.fixture
-def of(project: Path) -> Digest:
+def run_digest(project: Path) -> Digest:
     """Return the function `digest` for the project of this test."""
     return partial(digest, project)
 
@@ -168,48 +168,48 @@ def of(project: Path) -> Digest:
     ],
 )
 def test_any_file_that_a_run_reads_changes_the_digest(
-    project: Path, of: Digest, unchanged: ScenarioDigests, file: str, old: str, new: str
+    project: Path, run_digest: Digest, unchanged: ScenarioDigests, file: str, old: str, new: str
 ) -> None:
-    """However deep it is included; a moved model let --resume say passed where a fresh run failed."""
+    """Includes indirect includes: otherwise, `--resume` would keep the verdict of a scenario with a moved model."""
     text = (project / file).read_text()
     assert old in text
     (project / file).write_text(text.replace(old, new, 1))
-    assert of() != unchanged.run
+    assert run_digest() != unchanged.run
     (project / file).write_text(text)
-    assert of() == unchanged.run
+    assert run_digest() == unchanged.run
 
 
-def test_a_heightmap_changes_the_digest(project: Path, of: Digest, unchanged: ScenarioDigests) -> None:
-    """An image that an SDF file names is read like a mesh."""
+def test_a_heightmap_changes_the_digest(project: Path, run_digest: Digest, unchanged: ScenarioDigests) -> None:
+    """SDF files refer to images, too, not only to meshes."""
     Image.new("L", (3, 3), 0).save(project / "p/hill.png")
-    assert of() != unchanged.run
+    assert run_digest() != unchanged.run
 
 
-def test_unused_file_does_not_change_the_digest(project: Path, of: Digest, unchanged: ScenarioDigests) -> None:
+def test_unused_file_does_not_change_the_digest(project: Path, run_digest: Digest, unchanged: ScenarioDigests) -> None:
     """Otherwise `--resume` would keep no verdicts."""
     (project / "p/notes.txt").write_text("hello")
     (project / "models/other").mkdir()
-    assert of() == unchanged.run
+    assert run_digest() == unchanged.run
 
 
 def test_order_of_the_world_path_changes_the_digest_if_it_selects_another_model(
-    project: Path, of: Digest, unchanged: ScenarioDigests
+    project: Path, run_digest: Digest, unchanged: ScenarioDigests
 ) -> None:
-    """The first folder can contain another shelf."""
+    """The model `shelf` is in both folders; the first folder counts."""
     (project / "mine/shelf").mkdir(parents=True)
     (project / "mine/shelf/model.config").write_text(MODEL_CONFIG)
     (project / "mine/shelf/model.sdf").write_text(SHELF.replace("1 1 1", "2 2 2"))
-    assert of("mine", "models") != of("models", "mine")
-    assert of("models", "mine") == unchanged.run
+    assert run_digest("mine", "models") != run_digest("models", "mine")
+    assert run_digest("models", "mine") == unchanged.run
 
 
-def test_lenient_option_changes_the_digest(of: Digest, unchanged: ScenarioDigests) -> None:
-    """It leaves out unusable elements."""
-    assert of(lenient=True) != unchanged.run
+def test_lenient_option_changes_the_digest(run_digest: Digest, unchanged: ScenarioDigests) -> None:
+    """`--lenient` leaves out elements that simscen cannot use."""
+    assert run_digest(lenient=True) != unchanged.run
 
 
-def test_scenarios_of_one_world_list_all_its_files(project: Path, of: Digest) -> None:
-    """Also the second one, whose world another has had built already."""
+def test_scenarios_of_one_world_list_all_its_files(project: Path, run_digest: Digest) -> None:
+    """The second scenario lists them, too, although its world is already built."""
     (project / "p/b.scenario.yaml").write_text(FILES["p/a.scenario.yaml"])
     loaded, _ = load_selection([project / "p"], project / "p", [project / "models"], False, Selection())
     first, second = (scenario.read_files for scenario in loaded)
@@ -217,13 +217,13 @@ def test_scenarios_of_one_world_list_all_its_files(project: Path, of: Digest) ->
     assert {"model.sdf", "crate.stl", "hill.png", "cart.xacro", "size.xacro", "mast.stl"} <= {f.name for f in first}
 
 
-@pytest.mark.parametrize("what", ["software_versions", "cpu_flags", "arithmetic_fingerprints", "source_digest"])
+@pytest.mark.parametrize("function", ["software_versions", "cpu_flags", "arithmetic_fingerprints", "source_digest"])
 def test_software_and_processor_change_the_digest(
-    of: Digest, unchanged: ScenarioDigests, monkeypatch: pytest.MonkeyPatch, what: str
+    run_digest: Digest, unchanged: ScenarioDigests, monkeypatch: pytest.MonkeyPatch, function: str
 ) -> None:
-    """Another release of Bullet, other vector instructions or another simscen may change last bits."""
-    monkeypatch.setattr(module, what, lambda: {"pybullet": "0"})
-    assert of() != unchanged.run
+    """Another release of Bullet, other vector instructions, or another simscen may change the last bits of a result."""
+    monkeypatch.setattr(module, function, lambda: {"pybullet": "0"})
+    assert run_digest() != unchanged.run
 
 
 @pytest.mark.sample(4)

@@ -1,10 +1,10 @@
-"""A robot inside a solid obstacle collides with it, however it got there."""
+"""Test of robots inside solid obstacles."""
 
 import pytest
 
 from simscen.core.records.events import EventKind
 
-THICK = """\
+SOLID_OBSTACLES = """\
 simscen: 1
 walls: [{points: [[0, 0], [8, 0], [8, 6], [0, 6], [0, 0]]}]
 obstacles:
@@ -20,7 +20,7 @@ obstacles:
 )
 def test_a_robot_that_is_kidnapped_into_an_obstacle_collides_and_has_no_clearance(play, name, x, y):
     extra = f"events: [{{when: {{time: 1 s}}, do: {{kidnap: {{pose: {{x: {x}, y: {y}}}}}}}}}]\n"
-    trace = play(extra, room=THICK, time_limit="3")
+    trace = play(extra, room=SOLID_OBSTACLES, time_limit="3")
     (hit,) = trace.of_kind(EventKind.COLLISION_STARTED)
     assert (hit.tick, hit.name) == (241, name)
     inside = trace.clearance.values[trace.clearance.ticks > 241]

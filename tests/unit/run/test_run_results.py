@@ -1,4 +1,4 @@
-"""Tests of the results of runs whose process ended early."""
+"""Tests of the results of runs whose worker process was killed or crashed."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -50,6 +50,6 @@ def test_incomplete_description_of_a_stack_is_ignored(job: Job) -> None:
     assert run.warnings == ("no lidar",)
 
 
-def test_a_real_time_signal_has_no_name(job: Job) -> None:
+def test_crash_by_a_real_time_signal_is_reported_by_number(job: Job) -> None:
     run = finished_run(job, replace(KILLED, killed_for=None, signal=40))
     assert run.result.error.message == "crashed: signal 40 (peak memory 0 MiB of 4096 MiB)"

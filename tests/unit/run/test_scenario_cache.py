@@ -1,4 +1,4 @@
-"""Tests of the cache of the fork server."""
+"""Tests of the fork server's cache of prepared scenarios."""
 
 from pathlib import Path
 
@@ -23,9 +23,9 @@ def test_variations_of_one_world_build_it_once_and_keep_only_the_last(tmp_path: 
     variations = try_variations(tmp_path / "a.scenario.yaml", tmp_path)
     assert isinstance(variations, tuple)
     cache = ScenarioCache(CachedWorldBuilder(DiskCache(None)))
-    prepared = [cache.get_or_prepare(one) for one in variations]
-    assert len({id(one.built) for one in prepared}) == 1
-    assert [one.start.x for one in prepared] == [1, 2, 3]
+    prepared = [cache.get_or_prepare(variation) for variation in variations]
+    assert len({id(scenario.built) for scenario in prepared}) == 1
+    assert [scenario.start.x for scenario in prepared] == [1, 2, 3]
     assert cache.get_or_prepare(variations[2]) is prepared[2]
     assert cache.get_or_prepare(variations[0]) is not prepared[0]
 

@@ -1,4 +1,4 @@
-"""Files of the cache between sessions: only valid ones, only of this user, and a limited number."""
+"""Tests of the cache on disk, which sessions share: validity, ownership, and size of its files."""
 
 import errno
 import os
@@ -36,9 +36,9 @@ def test_cache_is_found_by_the_next_session(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("damage", ["empty", "cut", "changed", "swapped", "link", "folder", "fifo"])
 def test_damaged_cache_file_is_replaced(tmp_path: Path, damage: str) -> None:
-    kept = DiskCache(tmp_path / "c")
-    kept.put(KEY, b"content")
-    kept.put(OTHER, b"of another")
+    cache = DiskCache(tmp_path / "c")
+    cache.put(KEY, b"content")
+    cache.put(OTHER, b"of another")
     file = tmp_path / "c" / KEY
     whole = file.read_bytes()
     file.unlink()
@@ -58,34 +58,34 @@ def test_damaged_cache_file_is_replaced(tmp_path: Path, damage: str) -> None:
             file.mkdir()
         case "fifo":
             os.mkfifo(file)
-    assert kept.get(KEY) is None
-    kept.put(KEY, b"content")
-    assert kept.get(KEY) == (None if damage == "folder" else b"content")
+    assert cache.get(KEY) is None
+    cache.put(KEY, b"content")
+    assert cache.get(KEY) == (None if damage == "folder" else b"content")
 
 
 def test_a_folder_that_other_users_can_write_to_is_not_used(tmp_path: Path) -> None:
-    kept = DiskCache(tmp_path / "c")
-    kept.put(KEY, b"content")
+    cache = DiskCache(tmp_path / "c")
+    cache.put(KEY, b"content")
     (tmp_path / "c").chmod(0o777)
-    assert kept.get(KEY) is None
-    kept.put(OTHER, b"more")
+    assert cache.get(KEY) is None
+    cache.put(OTHER, b"more")
     assert not (tmp_path / "c" / OTHER).exists()
     assert not is_private_folder(tmp_path / "nowhere")
 
 
 def test_least_recently_used_cache_file_is_deleted_first(tmp_path: Path) -> None:
     keys = [f"{number:064x}" for number in range(6)]
-    kept = DiskCache(tmp_path, max_bytes=500)
+    cache = DiskCache(tmp_path, max_bytes=500)
     for number, key in enumerate(keys[:4]):
-        kept.put(key, bytes(68))
+        cache.put(key, bytes(68))
         os.utime(tmp_path / key, (number, number))
-    assert DiskCache(tmp_path, 500).get(keys[0]) == bytes(68), "used again just now"
+    assert DiskCache(tmp_path, 500).get(keys[0]) == bytes(68), "this makes it the most recently used"
     for key in keys[4:]:
         DiskCache(tmp_path, 500).put(key, bytes(68))
     assert sorted(path.name for path in tmp_path.iterdir()) == [keys[0], *keys[2:]]
     assert disk_usage(tmp_path) == (5, 500)
-    kept.put(OTHER, bytes(1000))
-    assert kept.get(OTHER) is None, "it has no room at all"
+    cache.put(OTHER, bytes(1000))
+    assert cache.get(OTHER) is None, "the content is larger than the cache"
 
 
 def test_concurrent_writes_of_one_entry_leave_one_valid_file(tmp_path: Path) -> None:
@@ -101,9 +101,9 @@ def test_concurrent_writes_of_one_entry_leave_one_valid_file(tmp_path: Path) -> 
 
 def test_an_unwritable_folder_disables_the_cache(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("in the way")
-    kept = DiskCache(tmp_path / "file" / "c")
-    kept.put(KEY, b"content")
-    assert kept.get(KEY) is None
+    cache = DiskCache(tmp_path / "file" / "c")
+    cache.put(KEY, b"content")
+    assert cache.get(KEY) is None
 
 
 def test_an_entry_on_a_read_only_file_system_is_used(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,4 +1,4 @@
-"""Cached maps and shortest paths change nothing but the duration of a session."""
+"""Tests that cached maps and shortest paths do not change results."""
 
 from pathlib import Path
 
@@ -32,8 +32,8 @@ def test_logs_are_the_same_with_a_cold_a_warm_and_a_damaged_cache(tmp_path: Path
     loaded = load_scenario(tmp_path / "a.scenario.yaml", tmp_path)
     cache = tmp_path / "cache"
 
-    def log(kept: DiskCache) -> bytes:
-        prepared = ScenarioCache(CachedWorldBuilder(kept)).get_or_prepare(loaded)
+    def log(disk_cache: DiskCache) -> bytes:
+        prepared = ScenarioCache(CachedWorldBuilder(disk_cache)).get_or_prepare(loaded)
         simulate(prepared, 1, log=tmp_path / "run.mcap")
         return (tmp_path / "run.mcap").read_bytes()
 
@@ -50,33 +50,33 @@ def test_logs_are_the_same_with_a_cold_a_warm_and_a_damaged_cache(tmp_path: Path
 
 def test_readable_but_invalid_cache_file_is_ignored(tmp_path: Path) -> None:
     files = DiskCache(tmp_path)
-    kept = CachedWorldBuilder(files)
+    builder = CachedWorldBuilder(files)
     world = World("w", (Solid(Box((4.0, 0.2, 1.0)), Pose3(0.0, 2.0, 0.5), "wall"),), bounds=(-3.0, -3.0, 3.0, 3.0))
-    built = kept.build(world, 0.2)
+    built = builder.build(world, 0.2)
     ends = [(Pose2(0.0, 0.0), Goal("far", Pose2(0.0, 2.9)))]
-    legs = kept.legs(built, ends, 0.2)
-    for nonsense in (b"", b"[]", b"[1]", b'[{"length": "short"}]', bytes(40), bytes([255]) * 40):
+    legs = builder.legs(built, ends, 0.2)
+    for invalid_content in (b"", b"[]", b"[1]", b'[{"length": "short"}]', bytes(40), bytes([255]) * 40):
         for file in list(tmp_path.iterdir()):
-            files.put(file.name, nonsense)
-        again = kept.build(world, 0.2)
+            files.put(file.name, invalid_content)
+        again = builder.build(world, 0.2)
         assert (again.map.cells == built.map.cells).all()
         assert again.map.cells.dtype == built.map.cells.dtype
-        assert kept.legs(built, ends, 0.2) == legs
+        assert builder.legs(built, ends, 0.2) == legs
 
 
 @pytest.mark.parametrize("other", [(1.0, 0.0, 0.2), (0.0, 0.5, 0.2), (0.0, 0.0, 0.3)])
 def test_cached_path_lengths_depend_on_world_goal_and_robot(tmp_path: Path, other) -> None:
-    kept = CachedWorldBuilder(DiskCache(tmp_path))
+    builder = CachedWorldBuilder(DiskCache(tmp_path))
 
     def legs(wall: float, goal: float, radius: float) -> object:
         solid = Solid(Box((4.0, 0.2, 1.0)), Pose3(wall, 2.0, 0.5), "wall")
-        built = kept.build(World("w", (solid,), bounds=(-3.0, -3.0, 3.0, 3.0)), 0.2)
-        return kept.legs(built, [(Pose2(0.0, 0.0), Goal("far", Pose2(goal, 2.9)))], radius)
+        built = builder.build(World("w", (solid,), bounds=(-3.0, -3.0, 3.0, 3.0)), 0.2)
+        return builder.legs(built, [(Pose2(0.0, 0.0), Goal("far", Pose2(goal, 2.9)))], radius)
 
     assert legs(*other) != legs(0.0, 0.0, 0.2) == legs(0.0, 0.0, 0.2)
 
 
-def test_results_of_other_code_are_not_used(monkeypatch) -> None:
+def test_cache_key_depends_on_the_source_code(monkeypatch) -> None:
     before = scenario_cache.cache_key("map", 1.0)
     scenario_cache._environment_key.cache_clear()
     monkeypatch.setattr(scenario_cache, "source_digest", lambda *parts: "of another version")

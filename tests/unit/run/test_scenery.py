@@ -1,4 +1,4 @@
-"""Tests of the scenery in logs."""
+"""Tests of the scenery in logs: obstacles, ground, floors, zones, and places."""
 
 from pathlib import Path
 
@@ -9,7 +9,7 @@ from simscen.core.records.events import EventKind
 from simscen.loading.scenario import load_scenario
 from simscen.record.log_header import SCENERY_FILE, scenery_from_header
 from simscen.record.log_reader import read_log
-from simscen.run.log_header import world_scenery as scenery_in
+from simscen.run.log_header import world_scenery
 from simscen.run.preparation import prepare
 from simscen.run.simulate import simulate
 
@@ -18,15 +18,15 @@ ROOT = Path(__file__).parents[3]
 
 def scenery(name):
     file = ROOT / f"scenarios/{name}.scenario.yaml"
-    return scenery_in(prepare(load_scenario(file, ROOT)))
+    return world_scenery(prepare(load_scenario(file, ROOT)))
 
 
 def test_a_door_is_drawn_from_its_hinge_to_its_post_when_closed():
-    (door,) = [thing for thing in scenery("obstacles/door_closes").things if thing.name == "door meeting room"]
+    (door,) = [body for body in scenery("obstacles/door_closes").things if body.name == "door meeting room"]
     (panel,) = door.outlines
     assert door.closed is not None and door.opened is not None
-    shut = door.closed.apply(np.array(panel))
-    assert (shut[:, 0].min(), shut[:, 0].max()) == pytest.approx((8.5, 9.5), abs=0.002)
+    panel_when_closed = door.closed.apply(np.array(panel))
+    assert (panel_when_closed[:, 0].min(), panel_when_closed[:, 0].max()) == pytest.approx((8.5, 9.5), abs=0.002)
     assert door.pose == pytest.approx(door.opened)
     assert (door.opened.x, door.opened.y) == (9.5, 4.1)
 
@@ -48,8 +48,8 @@ goals: [{pose: {x: 2, y: 1}}]
 time_limit: 1 s
 pass: [{collisions: {max: 0}}]
 """)
-    found = scenery_in(prepare(load_scenario(file, tmp_path)))
-    assert [(one.name, one.height, one.uphill) for one in found.ground] == [
+    found = world_scenery(prepare(load_scenario(file, tmp_path)))
+    assert [(ground.name, ground.height, ground.uphill) for ground in found.ground] == [
         ("sill", 0.01, (0.0, 0.0)),
         ("ramp", 0.12, (-0.08, 0.0)),
     ]
@@ -57,7 +57,7 @@ pass: [{collisions: {max: 0}}]
     assert [(floor.region, floor.friction) for floor in found.floors] == [("bay", 0.35)]
 
 
-def test_zones_are_those_of_the_stack():
+def test_scenery_contains_the_zones_of_the_stack():
     assert [(zone.filter, zone.region) for zone in scenery("zones/closed_passage").zones] == [("keepout", "passage")]
     assert [(z.region, z.speed_limit) for z in scenery("zones/quiet_ward").zones] == [("north_corridor", 0.25)]
 
@@ -79,7 +79,7 @@ pass: [{collisions: {max: 0}}]
     simulate(prepared, log=tmp_path / "run.mcap")
     log = read_log(tmp_path / "run.mcap")
     found = scenery_from_header(log.header)
-    assert found == scenery_in(prepared)
+    assert found == world_scenery(prepared)
     assert found.map is not None and np.array_equal(found.map.grid.cells, prepared.built.map.cells)
     assert found.places["dock"].x == 3
     (spilled,) = log.trace.of_kind(EventKind.FLOOR_CHANGED)

@@ -1,4 +1,4 @@
-"""Searches for failures, on plants of eight parameters of which 0.4 % of the values fail."""
+"""Tests of the searches for failures, with the test functions of `search_plants`."""
 
 import math
 import statistics
@@ -14,6 +14,7 @@ from simscen.run.sessions.search import Search, SearchMethod, make_search
 
 
 def runs_to_failure(search: Search, plant: Callable[[Array], Array], threshold: float, limit: int) -> int:
+    """Return the number of runs until the first failure, at most `limit`."""
     runs = 0
     while runs < limit:
         points = search.ask(8)

@@ -1,4 +1,4 @@
-"""Shrinking of failures that a search found, on plants of eight parameters of which 0.4 % of the values fail."""
+"""Test of shrinking failures that a search found, with the test functions of `search_plants`."""
 
 import statistics
 from collections.abc import Callable, Sequence
@@ -17,11 +17,14 @@ from simscen.loading.yaml.tree import MappingNode, child, node_at
 from simscen.run.sessions.search import SearchMethod, make_search
 
 NOMINAL = 0.5
-MATTERING = {"linear": 8, "region": 3, "product": 4}
+MAX_REMAINING_PARAMETERS = {"linear": 8, "region": 3, "product": 4}
 
 
 class PlantRuns(CandidateRuns):
-    """Runs a plant instead of scenarios: the parameters are in `stack`, and a missing one has its nominal value."""
+    """Evaluates a test function instead of running scenarios.
+
+    The parameters are keys of `stack`; a missing parameter has its nominal value.
+    """
 
     def __init__(self, plant: Callable[[Array], Array], threshold: float) -> None:
         self.plant, self.threshold, self.runs, self.known = plant, threshold, 0, dict[tuple[float, ...], RunResult]()
@@ -47,7 +50,7 @@ def values_of(tree: MappingNode) -> tuple[float, ...]:
     return tuple(float(plain.get(f"p{number}", NOMINAL)) for number in range(8))
 
 
-def tree_of(values: Sequence[float]) -> MappingNode:
+def make_tree(values: Sequence[float]) -> MappingNode:
     lines = [f"  p{number}: {value:.6f}" for number, value in enumerate(values)]
     tree, _ = parse_yaml("\n".join(["stack:", *lines, ""]), "a")
     assert isinstance(tree, MappingNode)
@@ -69,20 +72,20 @@ def first_failure(plant: Callable[[Array], Array], threshold: float, seed: int) 
 def test_a_found_failure_is_shrunk_in_sixty_runs(name: str, is_quick: bool) -> None:
     plant = PLANTS[name]
     threshold = failure_threshold(plant)
-    spent, left = [], []
+    run_counts, remaining_counts = [], []
     for seed in range(1, 9 if is_quick else 21):
         found = first_failure(plant, threshold, seed)
         runs = PlantRuns(plant, threshold)
-        tree = tree_of(found)
+        tree = make_tree(found)
         margin = runs.result(values_of(tree)).verdicts[0].findings[0].margin
         shrinking = Shrinker(runs, Failure("plant", "plant", 0.5 * margin), tree)
-        nominal = tree_of([NOMINAL] * 8)
+        nominal = make_tree([NOMINAL] * 8)
         shrinking.shrink({("stack", f"p{number}"): node_at(nominal, ("stack", f"p{number}")) for number in range(8)})
         assert shrinking.is_complete
         values = values_of(shrinking.tree)
         assert threshold - float(plant(np.array(values))) <= 0.5 * margin
-        spent.append(runs.runs)
-        left.append(sum(value != NOMINAL for value in values))
-    print(name, statistics.median(spent), max(spent), statistics.mean(left))
-    assert statistics.median(spent) <= 60
-    assert max(left) <= MATTERING[name]
+        run_counts.append(runs.runs)
+        remaining_counts.append(sum(value != NOMINAL for value in values))
+    print(name, statistics.median(run_counts), max(run_counts), statistics.mean(remaining_counts))
+    assert statistics.median(run_counts) <= 60
+    assert max(remaining_counts) <= MAX_REMAINING_PARAMETERS[name]

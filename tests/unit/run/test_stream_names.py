@@ -1,4 +1,4 @@
-"""The random numbers of an event or fault do not depend on other ones."""
+"""Tests that the random numbers of an event or fault do not depend on other events and faults."""
 
 import math
 
@@ -44,11 +44,14 @@ faults:
   - {sensor: odom, dropout: {probability: 20 %%}, when: {time: 0.5 s}, for: 1 s}
   - {sensor: imu, dropout: {probability: 20 %%}}
 """
-TAKES_EFFECT = 240
+EFFECT_TICK = 240
 
 
-def before(trace, end=TAKES_EFFECT):
-    """Everything of a trace before a tick; which number an entry has in its list is no part of what happened."""
+def before(trace, end=EFFECT_TICK):
+    """Return the samples, scans, and events before tick `end`.
+
+    The index `entry` of an event in its list is left out because it changes with the number of entries.
+    """
     samples = [trace.truth, trace.velocity, trace.clearance, trace.belief, trace.odometry, trace.command]
     events = [
         (event.tick, str(event.kind), event.name, {k: v for k, v in event.data.items() if k != "entry"})
@@ -60,7 +63,7 @@ def before(trace, end=TAKES_EFFECT):
 
 @pytest.fixture(scope="module")
 def plain(play):
-    """The run without any more entries."""
+    """The part of the run without a further event or fault."""
     return before(play(RANDOM % ("", "")))
 
 
@@ -75,7 +78,7 @@ def test_adding_an_event_changes_nothing_before_it_takes_effect(play, plain, eve
     assert before(play(RANDOM % ("  - " + event % "when: {time: 1 s}" + "\n", ""))) == plain
 
 
-def rig(*faults):
+def make_injector(*faults):
     entries = [FaultEntry.model_validate(fault, by_alias=True, by_name=False) for fault in faults]
     kinds = {"lidar": FaultSetting(0.3, kind="Scan"), "odom": FaultSetting(0.3, kind="Odometry")}
     return FaultInjector(
@@ -87,10 +90,10 @@ def scan(tick=0):
     return Scan("lidar", tick, np.full(50, 2.0), -math.pi, 0.01, 0.1, 12.0)
 
 
-def seen(rig, ticks=20):
-    """What comes of some scans; None for those that never arrive."""
-    got = [rig.disturb((scan(tick),)) for tick in range(ticks)]
-    return [reading[0].ranges.tolist() if reading else None for reading in got]
+def disturbed_ranges(injector, ticks=20):
+    """Return the ranges of disturbed scans; None for a lost scan."""
+    readings = [injector.disturb((scan(tick),)) for tick in range(ticks)]
+    return [reading[0].ranges.tolist() if reading else None for reading in readings]
 
 
 KINDS = [{"noise": {"std": 0.1}}, {"dropout": {"probability": 0.5}}, {"beam_dropout": {"probability": 0.5}}]
@@ -101,24 +104,27 @@ LATER = {"sensor": "lidar", "when": {"time": "5 s"}}
 @pytest.mark.parametrize("other", KINDS)
 @pytest.mark.parametrize("name", [None, "mine"])
 def test_an_ended_fault_does_not_change_the_random_numbers_of_others(kind, other, name):
-    mine = {**LATER, **kind} | ({"name": name} if name else {})
-    alone, beside = rig(mine), rig({"sensor": "lidar", "for": "1 s", **other}, mine)
-    beside.begin(0)
-    seen(beside)
-    beside.end(0)
+    tested_fault = {**LATER, **kind} | ({"name": name} if name else {})
+    alone, with_other_fault = (
+        make_injector(tested_fault),
+        make_injector({"sensor": "lidar", "for": "1 s", **other}, tested_fault),
+    )
+    with_other_fault.begin(0)
+    disturbed_ranges(with_other_fault)
+    with_other_fault.end(0)
     alone.begin(0)
-    beside.begin(1)
-    np.testing.assert_equal(seen(alone), seen(beside))
+    with_other_fault.begin(1)
+    np.testing.assert_equal(disturbed_ranges(alone), disturbed_ranges(with_other_fault))
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_restarted_fault_has_new_random_numbers(kind):
-    again = rig({**LATER, **kind})
+    injector = make_injector({**LATER, **kind})
     drawn = []
     for _ in range(3):
-        again.begin(0)
-        drawn.append(repr(seen(again)))
-        again.end(0)
+        injector.begin(0)
+        drawn.append(repr(disturbed_ranges(injector)))
+        injector.end(0)
     assert len(set(drawn)) == 3
 
 
@@ -133,9 +139,9 @@ DISTORTIONS = [{"bias": {"linear_scale": 1.5}}, {"slip": {"left": 0.3, "right": 
 @pytest.mark.parametrize("second", [None, *DISTORTIONS])
 @pytest.mark.parametrize("order", [1, -1])
 def test_the_error_of_odometry_stays_when_the_same_or_another_fault_starts(first, second, order):
-    """The reported pose never jumps by more than a step, and what has been reported too much is never taken back."""
+    """The reported position does not jump, and the error that has built up is not corrected."""
     entries = [{"sensor": "odom", **kind} for kind in (first, second) if kind]
-    faults = rig(*entries[::order])
+    faults = make_injector(*entries[::order])
     indices = list(range(len(entries)))[::order]
     xs = []
     for k in range(100):
@@ -153,8 +159,8 @@ def test_the_error_of_odometry_stays_when_the_same_or_another_fault_starts(first
 
 def test_stream_names_depend_on_name_or_content_but_not_on_position():
     def names(*entries):
-        made = [EventEntry.model_validate(entry, by_alias=True, by_name=False) for entry in entries]
-        return stream_names(made)
+        events = [EventEntry.model_validate(entry, by_alias=True, by_name=False) for entry in entries]
+        return stream_names(events)
 
     push = {"when": {"time": "1 s"}, "do": {"push": {"impulse": [0, 1]}}}
     pull = {"when": {"time": 1.0, "delay": 0}, "do": {"push": {"impulse": [0, -1]}}}
@@ -168,5 +174,5 @@ def test_stream_names_depend_on_name_or_content_but_not_on_position():
 def test_keys_of_plugins_are_part_of_the_stream_name(yardwork):
     slow, fast = ({"when": {"reversing": speed}, "do": {"turn_robot": {"by": 1.0}}} for speed in (0.1, 0.2))
     other = {**slow, "do": {"turn_robot": {"by": 2.0}}}
-    names = stream_names([EventEntry.model_validate(words) for words in (slow, fast, other)])
+    names = stream_names([EventEntry.model_validate(entry) for entry in (slow, fast, other)])
     assert len({name.rpartition("#")[0] for name in names}) == 3

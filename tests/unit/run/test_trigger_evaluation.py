@@ -1,3 +1,5 @@
+"""Tests of the state of triggers: edges, repetition, delay, probability, and duration."""
+
 from dataclasses import dataclass
 from typing import ClassVar
 
@@ -13,15 +15,16 @@ from simscen.triggers.base import Trigger
 
 
 @dataclass
-class Now:
+class Situation:
     tick: int
     travelled: float = 0.0
     clock: ClassVar[Clock] = Clock(240)
 
 
 def firings(trigger: dict, travelled, seed=1):
-    firing = TriggerState(Trigger.model_validate(trigger), np.random.default_rng(seed))
-    return [firing.count_firings(Now(24 * beat, value)) for beat, value in enumerate(travelled)]
+    """Return how often the trigger fires at each beat of 24 ticks, given the traveled distance at each beat."""
+    state = TriggerState(Trigger.model_validate(trigger), np.random.default_rng(seed))
+    return [state.count_firings(Situation(24 * beat, value)) for beat, value in enumerate(travelled)]
 
 
 def test_a_rising_trigger_fires_once_when_its_condition_becomes_true():
@@ -61,7 +64,7 @@ def test_random_firings_depend_only_on_the_seed():
     assert firings(trigger, edges, seed=3) != firings(trigger, edges, seed=4)
 
 
-LASTING = {"travelled": 1.0, "for": "300 ms"}  # 72 ticks: three beats of a test
+LASTING = {"travelled": 1.0, "for": "300 ms"}  # 72 ticks: three beats
 
 
 def test_a_condition_with_a_duration_fires_at_the_end_of_the_duration():
@@ -97,21 +100,21 @@ COMBINED = {
 
 
 def lasts(values, beats):
-    """Brute force: true where the last so many steps back, and the one they began at, all are."""
+    """Return for each beat whether the values are true at this beat and the previous `beats` beats."""
     return np.array([k >= beats and values[k - beats : k + 1].all() for k in range(len(values))])
 
 
-@pytest.mark.parametrize("where", COMBINED)
-def test_durations_apply_inside_combined_conditions(where):
-    words, truth = COMBINED[where]
+@pytest.mark.parametrize("case", COMBINED)
+def test_durations_apply_inside_combined_conditions(case):
+    trigger, expected = COMBINED[case]
     rng = np.random.default_rng(5)
     fast, hall = (np.repeat(rng.random(60) < 0.6, rng.integers(1, 9, 60)) for _ in range(2))
     length = min(len(fast), len(hall))
     fast, hall = fast[:length], hall[:length]
-    watch = ConditionState(Trigger.model_validate(words))
+    state = ConditionState(Trigger.model_validate(trigger))
     square = ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
-    given = [
-        watch.holds(
+    states = [
+        state.holds(
             FakeStage(
                 tick=24 * k,
                 twist=Twist(1.0 if fast[k] else 0.0),
@@ -121,8 +124,8 @@ def test_durations_apply_inside_combined_conditions(where):
         )
         for k in range(length)
     ]
-    assert given == truth(fast, hall).tolist()
-    assert 0 < sum(given) < length
+    assert states == expected(fast, hall).tolist()
+    assert 0 < sum(states) < length
 
 
 def test_each_edge_fires_after_its_own_delay():

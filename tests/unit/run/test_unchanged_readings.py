@@ -1,4 +1,4 @@
-"""A fault takes effect if it changes any field of a reading by more than rounding. It must not lose a measurement."""
+"""Tests of the check that a fault has changed a reading, and that a fault returns a reading for each measurement."""
 
 from copy import deepcopy
 from dataclasses import fields, replace

@@ -1,4 +1,4 @@
-"""Runs of a small scenario whose stack is a program that a test writes; the tests here share stack_programs.py."""
+"""Fixtures that run a small scenario with a Python program as its stack. Makes `stack_programs.py` importable."""
 
 import os
 import sys
@@ -25,7 +25,7 @@ goals: [{name: desk, pose: {x: 2, y: 1}}]
 time_limit: 4
 pass: [{goals_reached: {}}]
 """
-BEGIN = """\
+IMPORTS = """\
 import os, sys, time, signal, socket
 sys.path.append(os.environ["SIMSCEN_PEER_PATH"])
 from simscen_peer import Connection, Peer, messages, wire
@@ -37,11 +37,14 @@ Play = Callable[..., Run]
 
 @pytest.fixture
 def program(tmp_path: Path) -> Program:
-    """A command that runs a program in Python which knows nothing but the standard library and the peer."""
+    """Return a function that returns the command for a Python program.
+
+    The program can import only the standard library and the peer module.
+    """
 
     def write(text: str, start_limit: float = 20.0, answer_limit: float = 20.0) -> ExternalCommand:
         file = tmp_path / f"stack-{len(list(tmp_path.iterdir()))}.py"
-        file.write_text(BEGIN + text)
+        file.write_text(IMPORTS + text)
         argv = (sys.executable, "-I", "-S", str(file))
         return ExternalCommand(argv, dict(os.environ), str(tmp_path), start_limit, answer_limit)
 
@@ -50,13 +53,16 @@ def program(tmp_path: Path) -> Program:
 
 @pytest.fixture
 def load(tmp_path: Path, program: Program) -> Load:
-    """The scenario with that program for a stack, and with other lines instead of or besides its own."""
+    """Return a function that loads SCENARIO with the program as its stack.
+
+    The keyword arguments replace or add top-level keys of the scenario.
+    """
 
     def write(text: str, name: str = "a", start_limit: float = 20.0, answer_limit: float = 20.0, **lines: str):
-        written = {line.split(":")[0]: line for line in SCENARIO.splitlines()}
-        written |= {key: f"{key}: {value}" for key, value in lines.items()}
+        keys = {line.split(":")[0]: line for line in SCENARIO.splitlines()}
+        keys |= {key: f"{key}: {value}" for key, value in lines.items()}
         file = tmp_path / f"{name}.scenario.yaml"
-        file.write_text("\n".join(written.values()) + "\n")
+        file.write_text("\n".join(keys.values()) + "\n")
         loaded = load_scenario(file, tmp_path)
         return replace(loaded, external_command=program(text, start_limit, answer_limit))
 
@@ -65,7 +71,10 @@ def load(tmp_path: Path, program: Program) -> Load:
 
 @pytest.fixture
 def play(load: Load, tmp_path: Path) -> Play:
-    """Runs the scenario in this process; the log is run.mcap, what the program prints is in stack.log."""
+    """Return a function that runs the scenario in this process.
+
+    The log is `run.mcap`; `stack.log` contains the output of the program.
+    """
 
     def run(text: str, **lines):
         return simulate(prepare(load(text, **lines)), log=tmp_path / "run.mcap", stack_log=tmp_path / "stack.log")

@@ -1,4 +1,4 @@
-"""Tests that any bytes from a stack are accepted or refused."""
+"""Tests that the answer of a stack is either decoded or refused, whatever bytes it contains."""
 
 import json
 from contextlib import suppress
@@ -38,7 +38,7 @@ EXAMPLES = {
 }
 
 
-def understand(**answer: bytes) -> Answer:
+def decode(**answer: bytes) -> Answer:
     return decode_answer({name: [data] for name, data in answer.items()}, 240, TIME, None, Pose2(0, 0, 0))
 
 
@@ -50,40 +50,40 @@ def test_there_is_an_example_of_each_topic() -> None:
 @pytest.mark.parametrize("name", EXAMPLES)
 @given(data=st.data())
 def test_corrupted_bytes_are_refused_or_decoded(name: str, data) -> None:
-    sound = bytearray(EXAMPLES[name])
+    changed = bytearray(EXAMPLES[name])
     for _ in range(data.draw(st.integers(0, 3))):
-        sound[data.draw(st.integers(0, len(sound) - 1))] = data.draw(st.integers(0, 255))
-    cut = data.draw(st.integers(0, len(sound)))
+        changed[data.draw(st.integers(0, len(changed) - 1))] = data.draw(st.integers(0, 255))
+    cut = data.draw(st.integers(0, len(changed)))
     with_belief = {} if name == "/amcl_pose" else {"/amcl_pose": EXAMPLES["/amcl_pose"]}
-    for garbage in (bytes(sound), bytes(sound[:cut]), HEADER + data.draw(st.binary(max_size=60))):
+    for corrupted in (bytes(changed), bytes(changed[:cut]), HEADER + data.draw(st.binary(max_size=60))):
         with suppress(ProtocolViolation):
-            understand(**{name: garbage}, **with_belief)
+            decode(**{name: corrupted}, **with_belief)
 
 
 def test_filtered_odometry_is_recorded_unchanged() -> None:
-    (odometry,) = understand(**{"/odometry/filtered": EXAMPLES["/odometry/filtered"]}).odometry
+    (odometry,) = decode(**{"/odometry/filtered": EXAMPLES["/odometry/filtered"]}).odometry
     assert odometry.pose == pytest.approx(Pose2(1, 2, 3))
     assert (odometry.tick, odometry.twist) == (240, (0.5, 0.0, 0.1))
     assert odometry.twist_variance == (0.1, 0.2, 0.3)
-    (exact,) = understand(**{"/odometry/filtered/exact": EXAMPLES["/odometry/filtered/exact"]}).odometry
+    (exact,) = decode(**{"/odometry/filtered/exact": EXAMPLES["/odometry/filtered/exact"]}).odometry
     assert (exact.tick, exact.pose, exact.pose_covariance) == (240, (1, 2, 3), (0.5,) * 9)
 
 
 def test_without_a_transform_the_correction_follows_from_the_filtered_odometry() -> None:
     names = "/odometry/filtered", "/amcl_pose"
-    belief = understand(**{name: EXAMPLES[name] for name in names}).belief
+    belief = decode(**{name: EXAMPLES[name] for name in names}).belief
     assert belief is not None
     assert belief.map_from_odom == pytest.approx(Pose2(0.0, 0.0, 0.0))
 
 
-@pytest.mark.parametrize("rows", [[241, *[0.5] * 18], [-1, *[0.5] * 18], [240, float("nan"), *[0.5] * 17], [240, 1]])
-def test_invalid_filtered_odometry_is_refused(rows: list[float]) -> None:
+@pytest.mark.parametrize("numbers", [[241, *[0.5] * 18], [-1, *[0.5] * 18], [240, float("nan"), *[0.5] * 17], [240, 1]])
+def test_invalid_filtered_odometry_is_refused(numbers: list[float]) -> None:
     with pytest.raises(ProtocolViolation):
-        understand(**{"/odometry/filtered/exact": messages.float64_array(rows)})
+        decode(**{"/odometry/filtered/exact": messages.float64_array(numbers)})
 
 
 def test_costmap_is_recorded_unchanged() -> None:
-    (costmap,) = understand(**{"/global_costmap/costmap": EXAMPLES["/global_costmap/costmap"]}).costmaps
+    (costmap,) = decode(**{"/global_costmap/costmap": EXAMPLES["/global_costmap/costmap"]}).costmaps
     assert (costmap.name, costmap.frame, costmap.grid.origin) == ("global", "map", Pose2(1, 2, 0))
     assert costmap.grid.cells.tolist() == [[0, 100], [-1, 50]]
     assert costmap.grid.resolution == pytest.approx(0.05)
@@ -99,9 +99,9 @@ def test_costmap_is_recorded_unchanged() -> None:
     ],
 )
 def test_an_invalid_costmap_is_refused(frame: str, resolution: float, width: int, origin) -> None:
-    answer = messages.occupancy_grid((1, 0), frame, resolution, width, origin, [0, 100, -1, 50])
+    message = messages.occupancy_grid((1, 0), frame, resolution, width, origin, [0, 100, -1, 50])
     with pytest.raises(ProtocolViolation, match="local costmap"):
-        understand(**{"/local_costmap/costmap": answer})
+        decode(**{"/local_costmap/costmap": message})
 
 
 json_values = st.recursive(
@@ -109,21 +109,21 @@ json_values = st.recursive(
     lambda inner: st.lists(inner, max_size=3) | st.dictionaries(st.text(max_size=3), inner, max_size=3),
     max_leaves=6,
 )
-kinds = st.sampled_from(["goal.accepted", "goal.reached", "goal.failed", "goal.canceled", "plan.made"])
+event_kinds = st.sampled_from(["goal.accepted", "goal.reached", "goal.failed", "goal.canceled", "plan.made"])
 events = st.fixed_dictionaries(
-    {"kind": kinds | json_values},
+    {"kind": event_kinds | json_values},
     optional={"name": json_values, "data": json_values, "tick": json_values},
 )
 
 
 @given(events)
-def test_any_event_is_accepted_or_refused_and_can_be_logged(answer) -> None:
+def test_any_event_is_accepted_or_refused_and_can_be_logged(event_fields) -> None:
     from simscen.peer.messages import log, string
     from simscen.record.messages.event_text import log_text, to_json
 
     goals = GoalTracker(True, 240)
     with suppress(ProtocolViolation):
-        for event in understand(**{"/simscen/events": messages.string(json.dumps(answer))}).events:
+        for event in decode(**{"/simscen/events": messages.string(json.dumps(event_fields))}).events:
             goals.process(240, event)
     for event in goals.take_events():
         string(to_json(event))
@@ -132,10 +132,10 @@ def test_any_event_is_accepted_or_refused_and_can_be_logged(answer) -> None:
 
 
 @given(st.dictionaries(st.sampled_from(["protocol", "name", "version", "topics", "step", "about"]), json_values))
-def test_any_welcome_is_accepted_or_refused_and_can_be_logged(expected) -> None:
-    expected.setdefault("protocol", 1)
+def test_any_welcome_is_accepted_or_refused_and_can_be_logged(content) -> None:
+    content.setdefault("protocol", 1)
     with suppress(ProtocolViolation, wire.Malformed):
-        welcome = Welcome.parse(wire.WELCOME, json.dumps(expected).encode(), ())
+        welcome = Welcome.parse(wire.WELCOME, json.dumps(content).encode(), ())
         assert all(text.encode() is not None for text in welcome.facts.values())
 
 
@@ -150,7 +150,7 @@ def test_any_answer_is_decoded_or_malformed(body: bytes) -> None:
 
 
 @pytest.mark.parametrize(
-    "answer",
+    "event_json",
     [
         '{"kind": "plan.made", "data": {"length": NaN}}',
         '{"kind": "plan.made", "data": {"length": [-Infinity]}}',
@@ -161,9 +161,9 @@ def test_any_answer_is_decoded_or_malformed(body: bytes) -> None:
         '{"kind": "plan.made", "data": {"x": "' + 5000 * "x" + '"}}',
     ],
 )
-def test_an_event_that_cannot_be_logged_is_refused(answer: str) -> None:
+def test_an_event_that_cannot_be_logged_is_refused(event_json: str) -> None:
     with pytest.raises(ProtocolViolation):
-        for event in understand(**{"/simscen/events": messages.string(answer)}).events:
+        for event in decode(**{"/simscen/events": messages.string(event_json)}).events:
             GoalTracker(True, 240).process(240, event)
 
 
@@ -185,12 +185,12 @@ def test_particles_that_are_not_finite_are_refused(topic: str) -> None:
     particle = (1.0, 2.0, 3.0, float("nan"))
     data = messages.float64_array(particle) if "exact" in topic else messages.particle_cloud((1, 0), [particle])
     with pytest.raises(ProtocolViolation, match="a particle on /particle_cloud that is not finite"):
-        understand(**{"/amcl_pose": EXAMPLES["/amcl_pose"], topic: data})
+        decode(**{"/amcl_pose": EXAMPLES["/amcl_pose"], topic: data})
 
 
 @pytest.mark.parametrize(("stamp", "tick"), [((0, 500_000_000), 120), ((1, 0), 240), ((0, 0), 240), ((1, 1), 240)])
 def test_a_plan_without_a_valid_stamp_was_made_in_this_step(stamp: tuple[int, int], tick: int) -> None:
     """Otherwise, criteria would compare the drive with another plan, or with none."""
-    plan = understand(**{"/plan": messages.path(stamp, [(1, 2, 3)])}).plan
+    plan = decode(**{"/plan": messages.path(stamp, [(1, 2, 3)])}).plan
     assert plan is not None
     assert plan.tick == tick

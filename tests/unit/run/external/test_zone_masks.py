@@ -17,7 +17,7 @@ WORLD = (
     "{simscen: 1, walls: [{points: [[0, 0], [8, 0], [8, 6], [0, 6], [0, 0]]}], "
     "regions: {near: [[4, 0], [5, 0], [5, 6], [4, 6]], far: [[6, 0], [7, 0], [7, 6], [6, 6]]}}"
 )
-PRINT = """\
+PRINT_MASKS = """\
 for step in peer:
     for m in step.messages:
         grid = m.content
@@ -33,24 +33,29 @@ NO_ZONES = Zones()
 
 
 def surroundings(**changes) -> Surroundings:
-    """A robot on a map of 4 by 4 m with cells of a meter."""
+    """Return a robot on an empty map of 4 m by 4 m, with cells of 1 m."""
     grid = OccupancyGrid(np.zeros((4, 4), dtype=np.int8), 1.0)
     return Surroundings(**{"robot": ROBOT, "map": grid, "tick_rate": 240, **changes})
 
 
-def drawn(around: Surroundings, zones: Zones, later: Zones = NO_ZONES) -> dict[str, list[list[int]]]:
-    """The masks as rows of values, from the lowest y."""
-    return {topic.name: grid.cells.tolist() for topic, grid in ZoneMasks(around, later).changed_masks(zones)}
+def changed_masks(
+    robot_surroundings: Surroundings, zones: Zones, event_zones: Zones = NO_ZONES
+) -> dict[str, list[list[int]]]:
+    """Return the masks by topic, as rows of cells from the lowest y upward."""
+    return {
+        topic.name: grid.cells.tolist()
+        for topic, grid in ZoneMasks(robot_surroundings, event_zones).changed_masks(zones)
+    }
 
 
 def test_mask_is_sent_again_when_an_event_enables_a_zone(play, tmp_path: Path) -> None:
     events = "[{name: x, when: {time: 0.5}, do: {keepout: {region: far}}}]"
     topics = ["/keepout_zones"]
     stack = "{external: mine, keepout: [near]}"
-    run = play(f'peer = Peer("mine", topics={topics})\n' + PRINT, world=WORLD, stack=stack, events=events)
-    heard = [line.split() for line in (tmp_path / "stack.log").read_text().splitlines()]
-    assert [line[2:] for line in heard] == [["100", "0"], ["100", "100"]]
-    assert [float(line[1]) for line in heard] == pytest.approx([0.0, 0.5], abs=0.051)
+    run = play(f'peer = Peer("mine", topics={topics})\n' + PRINT_MASKS, world=WORLD, stack=stack, events=events)
+    printed = [line.split() for line in (tmp_path / "stack.log").read_text().splitlines()]
+    assert [line[2:] for line in printed] == [["100", "0"], ["100", "100"]]
+    assert [float(line[1]) for line in printed] == pytest.approx([0.0, 0.5], abs=0.051)
     assert [event.name for event in run.trace.of_kind(EventKind.ZONE_SWITCHED)] == ["far"]
 
 
@@ -60,9 +65,9 @@ def test_speed_mask_is_sent_again_when_events_switch_its_zones(play, tmp_path: P
         "{name: y, when: {time: 0.4}, do: {speed_zone: {region: near, enabled: false}}}]"
     )
     stack = "{external: mine, speed_zones: [{region: near, speed_limit: 0.2}]}"
-    play('peer = Peer("mine", topics=["/speed_zones"])\n' + PRINT, world=WORLD, stack=stack, events=events)
-    heard = [line.split()[2:] for line in (tmp_path / "stack.log").read_text().splitlines()]
-    assert heard == [["20", "0"], ["20", "10"], ["0", "10"]]
+    play('peer = Peer("mine", topics=["/speed_zones"])\n' + PRINT_MASKS, world=WORLD, stack=stack, events=events)
+    printed = [line.split()[2:] for line in (tmp_path / "stack.log").read_text().splitlines()]
+    assert printed == [["20", "0"], ["20", "10"], ["0", "10"]]
 
 
 @pytest.mark.parametrize(("topic", "happened"), [("/odom", [False, False]), ("/keepout_zones", [True, False])])
@@ -76,39 +81,39 @@ def test_stack_switches_only_the_zones_whose_topic_it_receives(play, topic: str,
         world=WORLD,
         events=events,
     )
-    (done,) = run.trace.of_kind(EventKind.EVENT_ENDED)
-    assert [effect["happened"] for effect in done.data["effects"]] == happened
+    (ended,) = run.trace.of_kind(EventKind.EVENT_ENDED)
+    assert [effect["happened"] for effect in ended.data["effects"]] == happened
 
 
 def test_scenario_without_zones_has_no_masks() -> None:
-    assert drawn(surroundings(), NO_ZONES) == {}
+    assert changed_masks(surroundings(), NO_ZONES) == {}
 
 
 def test_keepout_polygon_covers_the_cells_whose_center_is_inside() -> None:
-    around = surroundings(keepout=(SQUARE,))
+    robot_surroundings = surroundings(keepout=(SQUARE,))
     rows = [[0, 0, 0, 0], [0, 100, 100, 0], [0, 100, 100, 0], [0, 0, 0, 0]]
-    assert drawn(around, Zones((SQUARE,))) == {KEEPOUT_ZONES.name: rows}
-    assert drawn(around, NO_ZONES) == {KEEPOUT_ZONES.name: [[0] * 4] * 4}
+    assert changed_masks(robot_surroundings, Zones((SQUARE,))) == {KEEPOUT_ZONES.name: rows}
+    assert changed_masks(robot_surroundings, NO_ZONES) == {KEEPOUT_ZONES.name: [[0] * 4] * 4}
 
 
 def test_mask_file_and_polygon_are_combined() -> None:
     file = OccupancyGrid(np.array([[100, 0]], dtype=np.int8), 2.0, Pose2(0.0, 0.0, 0.0))
     masks = FilterMasks(file)
-    found = drawn(surroundings(keepout=(SQUARE,), masks=masks), Zones((SQUARE,), (), masks))[KEEPOUT_ZONES.name]
+    found = changed_masks(surroundings(keepout=(SQUARE,), masks=masks), Zones((SQUARE,), (), masks))[KEEPOUT_ZONES.name]
     assert found == [[100, 100, 0, 0], [100, 100, 100, 0], [0, 100, 100, 0], [0, 0, 0, 0]]
 
 
 def test_mask_file_alone_is_sent_unchanged_until_it_is_switched_off() -> None:
     file = OccupancyGrid(np.array([[100, -1, 30]], dtype=np.int8), 2.0)
     masks = FilterMasks(file)
-    around = surroundings(masks=masks)
-    assert drawn(around, Zones((), (), masks)) == {KEEPOUT_ZONES.name: [[100, -1, 30]]}
-    assert drawn(around, NO_ZONES) == {KEEPOUT_ZONES.name: [[0, 0, 0]]}
+    robot_surroundings = surroundings(masks=masks)
+    assert changed_masks(robot_surroundings, Zones((), (), masks)) == {KEEPOUT_ZONES.name: [[100, -1, 30]]}
+    assert changed_masks(robot_surroundings, NO_ZONES) == {KEEPOUT_ZONES.name: [[0, 0, 0]]}
 
 
 def test_slower_of_two_limits_counts() -> None:
     zones = Zones((), ((SQUARE, 0.3), (EAST, 0.257)))
-    found = drawn(surroundings(speed_zones=zones.speed), zones)[SPEED_ZONES.name]
+    found = changed_masks(surroundings(speed_zones=zones.speed), zones)[SPEED_ZONES.name]
     assert found == [[0, 0, 25, 25], [0, 30, 25, 25], [0, 30, 25, 25], [0, 0, 25, 25]]
 
 
@@ -116,9 +121,14 @@ def test_limits_in_percent_keep_the_scale_of_the_mask_file() -> None:
     """The limit of the file is (100 - value) percent of 0.5 m/s: 0.25 m/s."""
     limits = SpeedLimits(OccupancyGrid(np.full((2, 2), 50, dtype=np.int8), 1.0), True, 100.0, -1.0)
     zones = Zones((), ((SQUARE, 0.1),), FilterMasks(None, limits))
-    around = surroundings(speed_zones=zones.speed, masks=zones.masks)
-    assert drawn(around, zones)[SPEED_ZONES.name] == [[50, 50, 0, 0], [50, 80, 80, 0], [0, 80, 80, 0], [0, 0, 0, 0]]
-    assert ZoneMasks(around, NO_ZONES).meanings == [
+    robot_surroundings = surroundings(speed_zones=zones.speed, masks=zones.masks)
+    assert changed_masks(robot_surroundings, zones)[SPEED_ZONES.name] == [
+        [50, 50, 0, 0],
+        [50, 80, 80, 0],
+        [0, 80, 80, 0],
+        [0, 0, 0, 0],
+    ]
+    assert ZoneMasks(robot_surroundings, NO_ZONES).meanings == [
         {"topic": "/speed_zones", "filter": "speed", "percent": True, "base": 100.0, "multiplier": -1.0}
     ]
 
@@ -127,21 +137,26 @@ def test_mask_file_with_a_constant_limit_is_combined_with_zones() -> None:
     """The limit of the file is 50 percent of 0.5 m/s, for any value."""
     limits = SpeedLimits(OccupancyGrid(np.full((2, 2), 7, dtype=np.int8), 1.0), True, 50.0, 0.0)
     zones = Zones((), ((SQUARE, 0.1),), FilterMasks(None, limits))
-    around = surroundings(speed_zones=zones.speed, masks=zones.masks)
-    assert drawn(around, zones)[SPEED_ZONES.name] == [[25, 25, 0, 0], [25, 10, 10, 0], [0, 10, 10, 0], [0, 0, 0, 0]]
-    assert ZoneMasks(around, NO_ZONES).meanings[0]["multiplier"] == pytest.approx(0.01)
+    robot_surroundings = surroundings(speed_zones=zones.speed, masks=zones.masks)
+    assert changed_masks(robot_surroundings, zones)[SPEED_ZONES.name] == [
+        [25, 25, 0, 0],
+        [25, 10, 10, 0],
+        [0, 10, 10, 0],
+        [0, 0, 0, 0],
+    ]
+    assert ZoneMasks(robot_surroundings, NO_ZONES).meanings[0]["multiplier"] == pytest.approx(0.01)
 
 
 def test_fast_limits_get_a_coarser_scale() -> None:
     zones = Zones((), ((SQUARE, 2.0),))
-    around = surroundings(speed_zones=zones.speed)
-    assert max(map(max, drawn(around, zones)[SPEED_ZONES.name])) == 100
-    assert ZoneMasks(around, NO_ZONES).meanings[0]["multiplier"] == pytest.approx(0.02)
+    robot_surroundings = surroundings(speed_zones=zones.speed)
+    assert max(map(max, changed_masks(robot_surroundings, zones)[SPEED_ZONES.name])) == 100
+    assert ZoneMasks(robot_surroundings, NO_ZONES).meanings[0]["multiplier"] == pytest.approx(0.02)
 
 
 def test_masks_without_a_map_cover_all_zones() -> None:
-    around = surroundings(map=None, keepout=(SQUARE,))
-    found = drawn(around, Zones((SQUARE,)), Zones((EAST,)))[KEEPOUT_ZONES.name]
+    robot_surroundings = surroundings(map=None, keepout=(SQUARE,))
+    found = changed_masks(robot_surroundings, Zones((SQUARE,)), Zones((EAST,)))[KEEPOUT_ZONES.name]
     assert (len(found), len(found[0])) == (80, 60)  # 4 m by 3 m
 
 

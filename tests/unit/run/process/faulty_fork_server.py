@@ -1,4 +1,4 @@
-"""A fork server whose runs go wrong the way the scenario's first tag says: the test-only hook for faults."""
+"""Fork server for tests, whose runs fail in the way that the first tag of the scenario names."""
 
 import contextlib
 import ctypes
@@ -18,7 +18,7 @@ def prepare(job):
             ctypes.string_at(0)
         case "prepare-exit":
             sys.exit(0)
-        case "prepare-hang":  # in C, with Python's lock held: no signal handler of Python's runs
+        case "prepare-hang":  # in C and holding the GIL, so that no Python signal handler can run
             signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGALRM})
             ctypes.PyDLL(None).sleep(60)
         case "prepare-memory":
@@ -31,7 +31,7 @@ def fault_of(job):
 
 
 def daemon(seconds):
-    """A process that left group, session and parent behind, as daemons do."""
+    """Start a process with its own session and without this process as its parent, as daemons do."""
     if os.fork() == 0:
         os.setsid()
         if os.fork() == 0:
@@ -42,9 +42,9 @@ def daemon(seconds):
         os._exit(0)
 
 
-def perform(job, tell):  # noqa: PLR0915 - a list of faults
+def perform(job, report_progress):  # noqa: PLR0915 - a list of faults
     fault = fault_of(job)
-    tell(1.5)
+    report_progress(1.5)
     match fault:
         case "segfault":
             ctypes.string_at(0)
@@ -64,15 +64,15 @@ def perform(job, tell):  # noqa: PLR0915 - a list of faults
             signal.signal(signal.SIGTERM, signal.SIG_IGN)
             time.sleep(60)
         case "memory":
-            hoard = [bytes(1 << 28) for _ in range(64)]
-            return {"outcome": f"{len(hoard)}"}
+            blocks = [bytes(1 << 28) for _ in range(64)]
+            return {"outcome": f"{len(blocks)}"}
         case "grandchild":
             subprocess.Popen(["sleep", "60"])
         case "daemon":
-            daemon(DAEMON)
+            daemon(DAEMON_DURATION_S)
             time.sleep(0.2)
         case "daemon-crash":
-            daemon(DAEMON)
+            daemon(DAEMON_DURATION_S)
             time.sleep(0.2)
             ctypes.string_at(0)
         case "stray-bytes":
@@ -103,7 +103,7 @@ def perform(job, tell):  # noqa: PLR0915 - a list of faults
     return {"outcome": "passed"}
 
 
-DAEMON = "61.25"
+DAEMON_DURATION_S = "61.25"
 
 RESULT = """{"format": 2, "scenario": "x", "seed": 1, "variation": "", "path": "x", "outcome": "passed", "ended": "",
 "simulated_seconds": 1.5, "tick_rate": 240, "again": "", "events": {}, "disturbances": [], "metrics": {},

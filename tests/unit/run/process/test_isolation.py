@@ -1,4 +1,4 @@
-"""Tests of the cleanup of processes."""
+"""Tests of killing the child processes of a run."""
 
 import os
 import shutil
@@ -11,7 +11,7 @@ import pytest
 from simscen.ros2.launch import descendants
 
 NAME = 9 * "\u00df"
-"""Name of a program: 18 bytes in UTF-8, of which the kernel keeps 15, and therefore half of a character."""
+"""Name of a program: 18 bytes in UTF-8. The kernel keeps 15 bytes, which end within a character."""
 KILL = """
 import subprocess, sys
 from simscen.run.process.isolation import kill_children_except
@@ -26,11 +26,11 @@ foreign = subprocess.Popen(["sleep", "5"])
 os.setresuid(65534, 65534, 0)
 own = subprocess.Popen(["sleep", "60"])
 kill_children_except(())
-ended = foreign.poll() is not None, own.poll() is not None
+completed = foreign.poll() is not None, own.poll() is not None
 os.setresuid(0, 0, 0)
 foreign.kill()
 foreign.wait()
-print(*ended)
+print(*completed)
 """
 """Starts a program as root, and then kills the children as another user."""
 
@@ -43,14 +43,14 @@ def copy_of_sleep(folder: Path) -> str:
 
 def test_children_with_a_name_that_is_cut_within_a_character_are_killed(tmp_path: Path) -> None:
     argv = [sys.executable, "-c", KILL, copy_of_sleep(tmp_path)]
-    ended = subprocess.run(argv, capture_output=True, text=True, check=False)
-    assert (ended.stdout, ended.stderr) == ("True\n", "")
+    completed = subprocess.run(argv, capture_output=True, text=True, check=False)
+    assert (completed.stdout, completed.stderr) == ("True\n", "")
 
 
 @pytest.mark.skipif(os.getuid() != 0, reason="only root can start a program of another user without a password")
 def test_a_child_of_another_user_does_not_prevent_the_killing_of_others() -> None:
-    ended = subprocess.run([sys.executable, "-c", KILL_AS_NOBODY], capture_output=True, text=True, check=False)
-    assert (ended.stdout, ended.stderr) == ("False True\n", "")
+    completed = subprocess.run([sys.executable, "-c", KILL_AS_NOBODY], capture_output=True, text=True, check=False)
+    assert (completed.stdout, completed.stderr) == ("False True\n", "")
 
 
 def test_descendants_with_a_name_that_is_cut_within_a_character_are_found(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Sessions on a Ray cluster of three nodes on this machine."""
+"""Tests of sessions on a Ray cluster of three nodes on this machine."""
 
 import os
 import signal
@@ -43,36 +43,40 @@ pass: [{goals_reached: {}}]
 
 @pytest.fixture
 def cluster() -> Iterator[Any]:
-    made = Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False})
-    made.others = [made.add_node(num_cpus=1) for _ in range(2)]
-    yield made
-    made.shutdown()
+    """A cluster of a head node and two further nodes, which are in `others`."""
+    ray_cluster = Cluster(initialize_head=True, head_node_args={"num_cpus": 1, "include_dashboard": False})
+    ray_cluster.others = [ray_cluster.add_node(num_cpus=1) for _ in range(2)]
+    yield ray_cluster
+    ray_cluster.shutdown()
 
 
 @pytest.fixture
 def jobs(tmp_path: Path) -> Callable[..., list[Job]]:
+    """Return a function that makes one job for each fault of `faulty_fork_server`."""
+
     def make(*faults: str) -> list[Job]:
-        made = []
+        new_jobs = []
         for number, fault in enumerate(faults):
             file = tmp_path / f"{number}.scenario.yaml"
             file.write_text(SCENARIO.format(fault=fault))
             loaded = load_scenario(file, tmp_path)
-            made.append(Job(number, loaded, loaded.key(1), tmp_path / f"out-{number}", 60.0))
-        return made
+            new_jobs.append(Job(number, loaded, loaded.key(1), tmp_path / f"out-{number}", 60.0))
+        return new_jobs
 
     return make
 
 
 def processes(word: str) -> list[int]:
-    found = []
+    """Return the ids of the processes whose command line contains the word."""
+    pids = []
     for process in Path("/proc").glob("[0-9]*"):
         try:
             command = command_of(int(process.name))
         except OSError:
             continue
         if word.encode() in command:
-            found.append(int(process.name))
-    return found
+            pids.append(int(process.name))
+    return pids
 
 
 def parent_of(pid: int) -> int:
@@ -84,40 +88,40 @@ def command_of(pid: int) -> bytes:
 
 
 def test_every_job_is_run_once_and_its_files_arrive(cluster, jobs) -> None:
-    made = jobs(*["fine"] * 12, "segfault", "exit-0")
+    planned = jobs(*["fine"] * 12, "segfault", "exit-0")
     with RayBackend(cluster.address, 3, ENTRY) as backend:
         for _ in range(2):  # the second time, the runners exist already
-            updates = list(backend.run(made))
-            assert sorted(one.number for one in updates if isinstance(one, Started)) == list(range(14))
-            ends = {one.number: one.end for one in updates if isinstance(one, Ended)}
+            updates = list(backend.run(planned))
+            assert sorted(update.number for update in updates if isinstance(update, Started)) == list(range(14))
+            ends = {update.number: update.end for update in updates if isinstance(update, Ended)}
             assert [isinstance(ends[n], ProcessEnd) and ends[n].code for n in range(12)] == [0] * 12
             assert ends[12].signal == signal.SIGSEGV
-            assert all((job.folder / "result.json").is_file() for job in made[:12])
+            assert all((job.folder / "result.json").is_file() for job in planned[:12])
     assert not processes(ENTRY[0])
 
 
 def test_jobs_of_a_killed_node_are_run_again_on_another_one(cluster, jobs) -> None:
-    made = jobs(*["fine"] * 30)
+    planned = jobs(*["fine"] * 30)
     with RayBackend(cluster.address, 3, ENTRY) as backend:
         updates = []
-        for update in backend.run(made):
+        for update in backend.run(planned):
             updates.append(update)
             if len(updates) == 10:
-                here = ray.get_runtime_context().get_node_id()  # any node of this machine
-                victim = next(node for node in cluster.others if node.node_id != here)
-                cluster.remove_node(victim, allow_graceful=False)
-    ends = [one for one in updates if isinstance(one, Ended)]
-    assert sorted(one.number for one in ends) == list(range(30))
-    assert all(isinstance(one.end, ProcessEnd) and one.end.code == 0 for one in ends)
+                driver_node = ray.get_runtime_context().get_node_id()
+                removed_node = next(node for node in cluster.others if node.node_id != driver_node)
+                cluster.remove_node(removed_node, allow_graceful=False)
+    ended = [update for update in updates if isinstance(update, Ended)]
+    assert sorted(update.number for update in ended) == list(range(30))
+    assert all(isinstance(update.end, ProcessEnd) and update.end.code == 0 for update in ended)
 
 
 def test_a_job_that_is_lost_twice_is_an_error(cluster, jobs) -> None:
-    """Kill each runner as soon as it has the job, which never ends."""
+    """Each runner is killed after it has taken the job, which never ends."""
     (job,) = jobs("hang")
-    done = threading.Event()
+    is_lost = threading.Event()
 
     def kill_runners() -> None:
-        while not done.wait(0.1):
+        while not is_lost.wait(0.1):
             for server in processes(ENTRY[0]):
                 runner = parent_of(server)
                 if b"ray::" in command_of(runner):
@@ -128,9 +132,9 @@ def test_a_job_that_is_lost_twice_is_an_error(cluster, jobs) -> None:
     killer.start()
     try:
         with RayBackend(cluster.address, 1, ENTRY) as backend:
-            (end,) = (one.end for one in backend.run([job]) if isinstance(one, Ended))
+            (end,) = (update.end for update in backend.run([job]) if isinstance(update, Ended))
     finally:
-        done.set()
+        is_lost.set()
         killer.join()
     assert isinstance(end, ForkServerDeath)
     assert "was lost with its node" in end.description
@@ -140,9 +144,9 @@ def test_a_session_on_a_cluster_writes_the_same_results(cluster, tmp_path: Path)
     (tmp_path / "a.scenario.yaml").write_text(DRIVE)
     for out, options in (("here", ["-j", "2"]), ("there", ["--backend", "ray", "--address", cluster.address])):
         command = [sys.executable, "-m", "simscen", "run", "a.scenario.yaml", "--repeat", "6", "--out", out, *options]
-        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
-        assert done.returncode == 0, done.stderr
-        assert "3 workers" in done.stdout or out == "here"
+        completed = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False)
+        assert completed.returncode == 0, completed.stderr
+        assert "3 workers" in completed.stdout or out == "here"
     for name in ("results.json", "runs/a/seed-4/run.mcap", "runs/a/seed-6/result.json"):
         assert (tmp_path / "here" / name).read_bytes() == (tmp_path / "there" / name).read_bytes()
 
@@ -161,8 +165,8 @@ def test_an_interrupt_ends_the_processes_on_all_nodes(cluster, tmp_path: Path) -
     session.send_signal(signal.SIGINT)
     session.communicate(timeout=60)
     assert session.returncode == 130
-    end = time.monotonic() + 20
-    while set(servers) & set(processes("fork_server_main")) and time.monotonic() < end:
+    deadline = time.monotonic() + 20
+    while set(servers) & set(processes("fork_server_main")) and time.monotonic() < deadline:
         time.sleep(0.1)
     assert not set(servers) & set(processes("fork_server_main"))
 

@@ -1,4 +1,4 @@
-"""Jobs that were packed on one machine and run on another: paths, files, and equal results."""
+"""Tests of jobs that are packed on one machine and run on another machine of a Ray cluster."""
 
 import shutil
 from dataclasses import replace
@@ -39,7 +39,7 @@ def send(path: Path) -> SentFile:
 
 @pytest.fixture
 def job(tmp_path: Path) -> Job:
-    """Return a run in the world of a ROS map, whose image is only named in the file of the map."""
+    """A job in the world of a ROS map. Only the file of the map names its image."""
     home = tmp_path / "here"
     (home / "maps").mkdir(parents=True)
     (home / "scenarios").mkdir()
@@ -91,7 +91,7 @@ def test_files_of_simscen_are_read_from_the_package_on_each_machine(job: Job, tm
     assert unpacked.scenario.robot.path == job.scenario.robot.path
 
 
-def test_a_queue_gives_each_job_to_one_runner_and_records_which() -> None:
+def test_a_queue_gives_each_job_to_one_runner_and_records_the_runner() -> None:
     queue = JobQueue()
     jobs = [PackedJob(number, b"", {}) for number in range(3)]
     for job in jobs:

@@ -1,4 +1,4 @@
-"""Tests of sessions: each run has one result, and a fault is never a pass."""
+"""Tests of sessions with faulty runs: each run has one result, and a faulty run never passes."""
 
 import contextlib
 import os
@@ -36,26 +36,31 @@ pass: [{{collisions: {{max: 0}}}}]
 
 @pytest.fixture
 def session(tmp_path):
+    """Return a function that runs one scenario for each fault.
+
+    It returns the finished runs by fault, and the exit code if the session stopped early.
+    """
+
     def run(*faults, events=None, entry=ENTRY, **options):
         scenarios = []
         for number, fault in enumerate(faults):
             file = tmp_path / f"{number}-{fault}.scenario.yaml"
             file.write_text(SCENARIO.format(fault=fault))
             scenarios.append(load_scenario(file, tmp_path))
-        chosen = SessionOptions(**{"wall_limit": 20.0, **options})
-        heard = [] if events is None else events
-        jobs = plan_jobs(scenarios, chosen, tmp_path / "out")
-        with Supervisor(chosen.workers, entry) as backend:
-            answers, stopped = run_session(jobs, chosen, backend, heard.append)
-        return {answer.key.scenario.partition("-")[2]: answer for answer in answers}, stopped
+        session_options = SessionOptions(**{"wall_limit": 20.0, **options})
+        received_events = [] if events is None else events
+        jobs = plan_jobs(scenarios, session_options, tmp_path / "out")
+        with Supervisor(session_options.workers, entry) as backend:
+            runs, stopped = run_session(jobs, session_options, backend, received_events.append)
+        return {finished.key.scenario.partition("-")[2]: finished for finished in runs}, stopped
 
     return run
 
 
 def test_successful_run_returns_its_result(session):
     events = []
-    answers, stopped = session("fine", events=events)
-    assert answers["fine"].outcome is Outcome.PASSED
+    runs, stopped = session("fine", events=events)
+    assert runs["fine"].outcome is Outcome.PASSED
     assert stopped is None
     assert [type(event) for event in events[:2]] == [RunStarted, RunProgress]
     assert events[1].simulated == 1.5
@@ -81,38 +86,38 @@ def test_successful_run_returns_its_result(session):
     ],
 )
 def test_a_faulty_run_is_an_error_with_its_cause_and_the_other_run_passes(session, fault, kind, expected):
-    answers, _ = session(fault, "fine", workers=2)
-    assert answers[fault].outcome is Outcome.ERROR
-    assert answers[fault].result.error.kind == kind
-    assert expected in answers[fault].result.error.message
-    assert answers["fine"].outcome is Outcome.PASSED
+    runs, _ = session(fault, "fine", workers=2)
+    assert runs[fault].outcome is Outcome.ERROR
+    assert runs[fault].result.error.kind == kind
+    assert expected in runs[fault].result.error.message
+    assert runs["fine"].outcome is Outcome.PASSED
     assert not daemons()
 
 
 def daemons():
-    """The processes that faulty_fork_server's daemon left, wherever they are."""
-    found = []
+    """Return the ids of all daemons that `faulty_fork_server` started."""
+    pids = []
     for entry in os.scandir("/proc"):
         with contextlib.suppress(OSError):
             if entry.name.isdigit() and b"61.25" in Path(entry.path, "cmdline").read_bytes().split(b"\0"):
-                found.append(entry.name)
-    return found
+                pids.append(entry.name)
+    return pids
 
 
 def test_the_log_of_a_crashed_worker_shows_where_it_crashed(session):
-    answers, _ = session("segfault")
-    assert "faulty_fork_server.py" in answers["segfault"].result.error.tail
+    runs, _ = session("segfault")
+    assert "faulty_fork_server.py" in runs["segfault"].result.error.tail
 
 
 @pytest.mark.parametrize("fault", ["hang", "deaf"])
 def test_a_run_beyond_its_wall_limit_is_killed_and_reported(session, fault):
-    answers, _ = session(fault, wall_limit=1.0)
-    assert answers[fault].result.error.kind == "timeout"
+    runs, _ = session(fault, wall_limit=1.0)
+    assert runs[fault].result.error.kind == "timeout"
 
 
 def test_the_worker_log_keeps_start_and_end_of_a_long_output(session, tmp_path, capfd):
-    answers, _ = session("flood")
-    assert answers["flood"].outcome is Outcome.PASSED
+    runs, _ = session("flood")
+    assert runs["flood"].outcome is Outcome.PASSED
     (log,) = tmp_path.rglob("worker.log")
     text = log.read_bytes()
     assert len(text) < 2 << 20
@@ -123,49 +128,49 @@ def test_the_worker_log_keeps_start_and_end_of_a_long_output(session, tmp_path, 
 
 
 def test_remaining_runs_pass_after_a_run_kills_the_fork_server(session):
-    answers, _ = session("kill-parent", "fine")
-    assert answers["kill-parent"].result.error.kind == "crashed"
-    assert answers["fine"].outcome is Outcome.PASSED
+    runs, _ = session("kill-parent", "fine")
+    assert runs["kill-parent"].result.error.kind == "crashed"
+    assert runs["fine"].outcome is Outcome.PASSED
 
 
 def test_concurrent_runs_are_repeated_after_a_run_kills_the_fork_server(session):
-    answers, _ = session("kill-parent", "long", "fine", workers=2)
-    assert [name for name, answer in answers.items() if answer.outcome is Outcome.PASSED] == ["long", "fine"]
-    assert answers["kill-parent"].result.error.kind == "crashed"
-    assert "that prepares runs was killed (SIGKILL) while" in answers["kill-parent"].result.error.message
+    runs, _ = session("kill-parent", "long", "fine", workers=2)
+    assert [name for name, finished in runs.items() if finished.outcome is Outcome.PASSED] == ["long", "fine"]
+    assert runs["kill-parent"].result.error.kind == "crashed"
+    assert "that prepares runs was killed (SIGKILL) while" in runs["kill-parent"].result.error.message
 
 
 def test_crash_while_preparing_a_world_affects_only_its_run(session):
     events = []
-    answers, _ = session("long", "prepare-segfault", "fine", workers=2, events=events)
-    assert [name for name, answer in answers.items() if answer.outcome is Outcome.PASSED] == ["fine", "long"]
+    runs, _ = session("long", "prepare-segfault", "fine", workers=2, events=events)
+    assert [name for name, finished in runs.items() if finished.outcome is Outcome.PASSED] == ["fine", "long"]
     for kind in (RunStarted, RunFinished):
-        expected = [event.key for event in events if isinstance(event, kind)]
-        assert len(expected) == len(set(expected)) == 3
+        keys = [event.key for event in events if isinstance(event, kind)]
+        assert len(keys) == len(set(keys)) == 3
 
 
 def test_a_preparation_that_hangs_in_c_is_a_timeout_with_its_stack(session, monkeypatch):
     monkeypatch.setattr(supervisor, "MAX_SILENCE_S", 2.0)
-    answers, _ = session("prepare-hang", "fine", wall_limit=1.0)
-    assert answers["prepare-hang"].result.error.kind == "timeout"
-    assert ", in prepare (faulty_fork_server.py:" in answers["prepare-hang"].result.error.message
-    assert answers["fine"].outcome is Outcome.PASSED
+    runs, _ = session("prepare-hang", "fine", wall_limit=1.0)
+    assert runs["prepare-hang"].result.error.kind == "timeout"
+    assert ", in prepare (faulty_fork_server.py:" in runs["prepare-hang"].result.error.message
+    assert runs["fine"].outcome is Outcome.PASSED
 
 
 @pytest.mark.slow
 def test_a_fork_server_that_is_stopped_is_replaced(session, monkeypatch):
     monkeypatch.setattr(supervisor, "MAX_SILENCE_S", 2.0)
-    answers, _ = session("stop-parent", "fine")
-    assert "did not respond and was killed" in answers["stop-parent"].result.error.message
-    assert answers["fine"].outcome is Outcome.PASSED
+    runs, _ = session("stop-parent", "fine")
+    assert "did not respond and was killed" in runs["stop-parent"].result.error.message
+    assert runs["fine"].outcome is Outcome.PASSED
 
 
 def test_a_fork_server_that_cannot_start_is_an_error_of_every_run_with_its_reason(session, tmp_path):
     broken = tmp_path / "broken.py"
     broken.write_text("import no_such_module")
-    answers, _ = session("fine", "hang", entry=(str(broken),))
-    assert [answer.outcome for answer in answers.values()] == [Outcome.ERROR] * 2
-    assert all("No module named 'no_such_module'" in answer.result.error.tail for answer in answers.values())
+    runs, _ = session("fine", "hang", entry=(str(broken),))
+    assert [finished.outcome for finished in runs.values()] == [Outcome.ERROR] * 2
+    assert all("No module named 'no_such_module'" in finished.result.error.tail for finished in runs.values())
 
 
 def test_jobs_are_not_taken_after_the_session_stops_because_the_fork_server_cannot_start(tmp_path):
@@ -201,9 +206,9 @@ def planned_jobs(tmp_path, *faults):
 
 
 def test_stray_bytes_on_the_pipes_are_ignored(session):
-    answers, _ = session("stray-bytes", "fine", workers=2)
-    assert answers["stray-bytes"].outcome is Outcome.PASSED
-    assert answers["fine"].outcome is Outcome.PASSED
+    runs, _ = session("stray-bytes", "fine", workers=2)
+    assert runs["stray-bytes"].outcome is Outcome.PASSED
+    assert runs["fine"].outcome is Outcome.PASSED
 
 
 def test_output_during_preparation_is_in_the_worker_log(session, tmp_path):
@@ -215,58 +220,58 @@ def test_output_during_preparation_is_in_the_worker_log(session, tmp_path):
 @pytest.mark.skipif(os.geteuid() == 0, reason="root writes everywhere")
 def test_an_output_folder_that_cannot_be_written_is_an_error_with_the_reason(session, tmp_path):
     (tmp_path / "out").mkdir(mode=0o500)
-    answers, _ = session("fine")
-    assert "Permission denied" in answers["fine"].result.error.message
+    runs, _ = session("fine")
+    assert "Permission denied" in runs["fine"].result.error.message
 
 
 def test_an_output_folder_that_cannot_be_created_is_an_error_with_the_reason(session, tmp_path):
     (tmp_path / "out").write_text("")
-    answers, _ = session("fine")
-    assert (answers["fine"].result.error.kind, "Not a directory writing" in answers["fine"].result.error.message) == (
+    runs, _ = session("fine")
+    assert (runs["fine"].result.error.kind, "Not a directory writing" in runs["fine"].result.error.message) == (
         "output",
         True,
     )
 
 
 def test_a_file_that_a_component_cannot_read_is_not_an_error_of_the_output(session):
-    answers, _ = session("missing-file")
-    error = answers["missing-file"].result.error
+    runs, _ = session("missing-file")
+    error = runs["missing-file"].result.error
     assert error.kind == "crashed"
     assert "No such file or directory: '/nowhere/parameters.txt' (" in error.message
     assert "writing" not in error.message
 
 
 def test_each_crashed_run_is_an_error(session):
-    answers, _ = session("segfault", "kill", "exit-0", "exception", "sys-exit", workers=2)
-    assert [answer.outcome for answer in answers.values()] == [Outcome.ERROR] * 5
+    runs, _ = session("segfault", "kill", "exit-0", "exception", "sys-exit", workers=2)
+    assert [finished.outcome for finished in runs.values()] == [Outcome.ERROR] * 5
 
 
 def test_fail_fast_reports_the_remaining_runs_as_not_run(session):
-    answers, _ = session("exception", "fine", fail_fast=True)
-    assert answers["fine"].result.error.kind == "not-run"
+    runs, _ = session("exception", "fine", fail_fast=True)
+    assert runs["fine"].result.error.kind == "not-run"
 
 
 def test_an_interrupted_session_has_a_result_for_every_run(session):
     def interrupt(number, _):
         raise Interrupted(number)
 
-    before = signal.signal(signal.SIGINT, interrupt)
+    previous_handler = signal.signal(signal.SIGINT, interrupt)
     events = []
 
-    def when_started():
+    def interrupt_after_start():
         while not any(isinstance(event, RunProgress) for event in events):
             time.sleep(0.01)
         os.kill(os.getpid(), signal.SIGINT)
 
-    watcher = threading.Thread(target=when_started, daemon=True)
+    watcher = threading.Thread(target=interrupt_after_start, daemon=True)
     try:
         watcher.start()
-        answers, stopped = session("hang", "fine", events=events)
+        runs, stopped = session("hang", "fine", events=events)
     finally:
-        signal.signal(signal.SIGINT, before)
+        signal.signal(signal.SIGINT, previous_handler)
     assert stopped is Exit.INTERRUPTED
-    assert answers["hang"].result.error.kind == "interrupted"
-    assert answers["fine"].result.error.kind == "not-run"
+    assert runs["hang"].result.error.kind == "interrupted"
+    assert runs["fine"].result.error.kind == "not-run"
 
 
 def test_a_supervisor_keeps_its_processes_between_two_sessions_until_it_is_closed(tmp_path):
@@ -277,8 +282,8 @@ def test_a_supervisor_keeps_its_processes_between_two_sessions_until_it_is_close
     with Supervisor(1, CHILD_ENTRY) as backend:
         for number in range(2):
             jobs = plan_jobs([load_scenario(file, tmp_path)], options, tmp_path / str(number))
-            answers, _ = run_session(jobs, options, backend, lambda event: None)
-            assert [answer.outcome for answer in answers] == [Outcome.PASSED]
+            runs, _ = run_session(jobs, options, backend, lambda event: None)
+            assert [finished.outcome for finished in runs] == [Outcome.PASSED]
             servers += _children()
     assert len(servers) == 2
     assert servers[0] == servers[1]
@@ -308,18 +313,18 @@ def test_a_fork_server_that_dies_between_two_sessions_is_started_again(tmp_path)
     with Supervisor(1, CHILD_ENTRY) as backend:
         for number in range(2):
             jobs = plan_jobs([load_scenario(file, tmp_path)], options, tmp_path / str(number))
-            answers, _ = run_session(jobs, options, backend, lambda event: None)
-            assert [answer.outcome for answer in answers] == [Outcome.PASSED]
+            runs, _ = run_session(jobs, options, backend, lambda event: None)
+            assert [finished.outcome for finished in runs] == [Outcome.PASSED]
             if number == 0:
                 (server,) = _children()
                 os.kill(server, signal.SIGKILL)
 
 
 def _children():
-    found = []
+    pids = []
     for stat in Path("/proc").glob("[0-9]*/stat"):
         with contextlib.suppress(OSError):
             state, parent = stat.read_text().rsplit(")", 1)[1].split()[:2]
             if int(parent) == os.getpid() and state != "Z":
-                found.append(int(stat.parent.name))
-    return found
+                pids.append(int(stat.parent.name))
+    return pids

@@ -1,4 +1,4 @@
-"""Tests of pedestrians in whole runs."""
+"""Tests of pedestrians in runs: motion, reactions, events, and free space."""
 
 import math
 
@@ -16,7 +16,7 @@ from simscen.sim.simulation import Simulation
 from simscen.worlds.built_world import build_world_and_map
 from simscen.worlds.geometry.triangulation import triangulate
 
-STANDING = {
+STANDING_ROBOT = {
     "stack": "{localizer: {type: ground_truth}}",
     "goals": "[]",
     "time_limit": "6",
@@ -34,34 +34,34 @@ def events(*lines: str) -> str:
     return "events:\n" + "".join(f"  - {line}\n" for line in lines)
 
 
-def text(trace, *kinds: EventKind) -> list[tuple[str, str]]:
+def kinds_and_names(trace, *kinds: EventKind) -> list[tuple[str, str]]:
     return [(event.kind.value, event.name) for event in trace.of_kind(*kinds)]
 
 
 def test_pedestrian_is_a_moving_object_of_type_person(play):
-    trace = play(events(f"{{when: {{time: 0}}, do: {ANNA}}}"), **STANDING)
+    trace = play(events(f"{{when: {{time: 0}}, do: {ANNA}}}"), **STANDING_ROBOT)
     spawned = trace.of_kind(EventKind.OBJECT_SPAWNED)[-1]
     assert spawned.data["person"] and spawned.data["behavior"] == "regular" and spawned.data["size"] == [0.25, 1.7]
-    assert text(trace, EventKind.PEDESTRIAN_REACHED)[0] == ("pedestrian.reached", "anna")
-    way = trace.objects["anna"].values
-    assert way[:, 0].max() > 6.7 and np.ptp(way[:, 1]) < 0.01
+    assert kinds_and_names(trace, EventKind.PEDESTRIAN_REACHED)[0] == ("pedestrian.reached", "anna")
+    positions = trace.objects["anna"].values
+    assert positions[:, 0].max() > 6.7 and np.ptp(positions[:, 1]) < 0.01
 
 
 def test_pedestrians_walk_around_obstacles_and_spawned_objects(play):
-    """A crate of the world, and one that an event put there."""
+    """The obstacles are a crate of the world and a box that an event spawns."""
     crate = "{spawn: {name: box, box: [0.4, 0.4, 1], pose: {x: 6, y: 3.2}}}"
     anna = "{pedestrian: {name: anna, pose: {x: 3.5, y: 5.5}, goals: [[7, 4.5], [6, 2]], speed: 1.4 m/s}}"
-    trace = play(events(f"{{when: {{time: 0}}, do: [{crate}, {anna}]}}"), **{**STANDING, "time_limit": "9"})
-    way = trace.objects["anna"].values[:, :2]
+    trace = play(events(f"{{when: {{time: 0}}, do: [{crate}, {anna}]}}"), **{**STANDING_ROBOT, "time_limit": "9"})
+    positions = trace.objects["anna"].values[:, :2]
     assert len(trace.of_kind(EventKind.PEDESTRIAN_REACHED)) == 2
     for (x, y), half in (((5.0, 4.5), 0.5), ((6.0, 3.2), 0.2)):
-        gap = np.hypot(*np.maximum(np.abs(way - (x, y)) - half, 0.0).T)
+        gap = np.hypot(*np.maximum(np.abs(positions - (x, y)) - half, 0.0).T)
         assert gap.min() >= 0.25 - 1e-6
 
 
 def test_reacting_pedestrian_emits_an_event(play):
     anna = "{pedestrian: {name: anna, pose: {x: 5, y: 1, yaw: 180 deg}, behavior: surprised, reacts_for: 2 s}}"
-    trace = play(events(f"{{when: {{time: 0}}, do: {anna}}}"), **{**STANDING, "robot": "{pose: {x: 2, y: 1}}"})
+    trace = play(events(f"{{when: {{time: 0}}, do: {anna}}}"), **{**STANDING_ROBOT, "robot": "{pose: {x: 2, y: 1}}"})
     reacted = trace.of_kind(EventKind.PEDESTRIAN_REACTED, EventKind.PEDESTRIAN_CALMED)
     assert [event.kind for event in reacted] == [EventKind.PEDESTRIAN_REACTED, EventKind.PEDESTRIAN_CALMED]
     assert reacted[1].tick - reacted[0].tick == 480
@@ -74,10 +74,10 @@ def test_events_can_move_or_remove_a_pedestrian(play):
         "{when: {time: 1}, do: {move: {name: anna, through: [[3.5, 1.5]], speed: 1}}}",
         "{when: {time: 5}, do: {remove: {name: anna}}}",
     )
-    trace = play(lines, **STANDING)
+    trace = play(lines, **STANDING_ROBOT)
     anna = trace.objects["anna"]
     assert np.allclose(anna.values[anna.ticks >= 4 * 240, :2][0], (3.5, 1.5))
-    assert text(trace, EventKind.OBJECT_REMOVED) == [("object.removed", "anna")]
+    assert kinds_and_names(trace, EventKind.OBJECT_REMOVED) == [("object.removed", "anna")]
     assert anna.ticks.max() <= 5 * 240
 
 
@@ -88,7 +88,7 @@ def test_pedestrians_are_not_spawned_without_free_space(play):
         "{when: {time: 0}, do: {pedestrian: {name: cleo, pose: {x: 1.1, y: 1}}}}",
         "{when: {time: 0}, do: {crowd: {name: guest, count: 40, start: corner}}}",
     )
-    trace = play(lines, **STANDING)
+    trace = play(lines, **STANDING_ROBOT)
     effects = [event.data["effects"][0]["happened"] for event in trace.of_kind(EventKind.EVENT_ENDED)]
     assert effects == [True, False, False, False]
 
@@ -98,24 +98,24 @@ def test_another_pedestrian_does_not_change_distant_ones(play):
     far = "{pedestrian: {name: aaron, pose: {x: 0.4, y: 5.6}}}"
     anna = "{pedestrian: {name: anna, pose: {x: 7.5, y: 1}, goals: [[7.5, 5]]}}"
     crowd = "{crowd: {name: guest, count: COUNT, start: corner, goals: [corner], repeat: loop}}"
-    alone = play(events(f"{{when: {{time: 0}}, do: {anna}}}"), **STANDING)
-    both = play(events(f"{{when: {{time: 0}}, do: [{far}, {anna}]}}"), **STANDING)
-    assert (alone.objects["anna"].values == both.objects["anna"].values).all()
-    robot = {**STANDING, "robot": "{pose: {x: 7, y: 5}}"}
+    without_others = play(events(f"{{when: {{time: 0}}, do: {anna}}}"), **STANDING_ROBOT)
+    with_aaron = play(events(f"{{when: {{time: 0}}, do: [{far}, {anna}]}}"), **STANDING_ROBOT)
+    assert (without_others.objects["anna"].values == with_aaron.objects["anna"].values).all()
+    robot = {**STANDING_ROBOT, "robot": "{pose: {x: 7, y: 5}}"}
     two, three = (
         play(events(f"{{when: {{time: 0}}, do: {crowd.replace('COUNT', count)}}}"), **robot) for count in ("2", "3")
     )
     for name in ("guest-1", "guest-2"):
         first = two.objects[name].values[0, :2], three.objects[name].values[0, :2]
-        assert np.allclose(*first, atol=0.02), "they come at the same place; then they may meet"
+        assert np.allclose(*first, atol=0.02), "they start at the same place; later they may meet"
 
 
 @pytest.mark.slow
 def test_speed_depends_on_the_seed_unless_it_is_specified(play):
     def fastest(anna: str, seed: int) -> float:
-        trace = play(events(f"{{when: {{time: 0}}, do: {anna}}}"), seed, **STANDING)
-        way = trace.objects["anna"]
-        return float((np.hypot(*np.diff(way.values[:, :2], axis=0).T) / np.diff(way.ticks)).max() * 240)
+        trace = play(events(f"{{when: {{time: 0}}, do: {anna}}}"), seed, **STANDING_ROBOT)
+        positions = trace.objects["anna"]
+        return float((np.hypot(*np.diff(positions.values[:, :2], axis=0).T) / np.diff(positions.ticks)).max() * 240)
 
     assert fastest(ANNA, 1) == fastest(ANNA, 1) != fastest(ANNA, 2)
     slow = ANNA.replace("repeat", "speed: 0.5 m/s, repeat")
@@ -123,13 +123,15 @@ def test_speed_depends_on_the_seed_unless_it_is_specified(play):
 
 
 def test_only_blind_pedestrians_touch_the_robot(play):
-    def touched(more: str) -> list[tuple[str, str]]:
+    def collisions(more: str) -> list[tuple[str, str]]:
         anna = f"{{pedestrian: {{name: anna, pose: {{x: 4, y: 1}}, goals: [[0.5, 1]]{more}}}}}"
-        trace = play(events(f"{{when: {{time: 0}}, do: {anna}}}"), **{**STANDING, "robot": "{pose: {x: 2, y: 1}}"})
-        return text(trace, EventKind.COLLISION_STARTED)
+        trace = play(
+            events(f"{{when: {{time: 0}}, do: {anna}}}"), **{**STANDING_ROBOT, "robot": "{pose: {x: 2, y: 1}}"}
+        )
+        return kinds_and_names(trace, EventKind.COLLISION_STARTED)
 
-    assert touched("") == touched(", behavior: impassive") == []
-    assert touched(", blind_to: [robots]")[0] == ("collision.started", "anna")
+    assert collisions("") == collisions(", behavior: impassive") == []
+    assert collisions(", blind_to: [robots]")[0] == ("collision.started", "anna")
 
 
 def test_pedestrians_have_no_room_inside_a_solid():
@@ -158,7 +160,7 @@ def test_walls_block_pedestrians_from_their_shins_to_their_heads(solids, blocks)
 
 def test_objects_block_pedestrians_only_at_the_height_and_tilt_of_their_pose():
     def has_room(solid: Solid, pose: Pose3, *places: tuple[float, float]) -> list[bool]:
-        body = Body("thing", (solid,), pose)
+        body = Body("object", (solid,), pose)
         built = build_world_and_map(World("w", (), (body,), bounds=(-4.0, -4.0, 4.0, 4.0)), 0.2)
         simulation = Simulation(built.mesh, [body], {}, triangulate)
         try:
@@ -173,5 +175,5 @@ def test_objects_block_pedestrians_only_at_the_height_and_tilt_of_their_pose():
     hanging = Solid(Box((1.0, 1.0, 1.5)), Pose3(z=-0.8))
     assert has_room(hanging, Pose3(z=1.8), (0.0, 0.0), (0.8, 0.0)) == [False, True]
     pole = Solid(Box((0.1, 0.1, 3.0)), Pose3(z=1.5))
-    lying = Pose3.from_rpy(0.0, 0.0, 0.1, 0.0, math.pi / 2, math.pi / 2)  # it has fallen to +y
+    lying = Pose3.from_rpy(0.0, 0.0, 0.1, 0.0, math.pi / 2, math.pi / 2)  # lies along +y
     assert has_room(pole, lying, (0.0, 2.0), (2.0, 0.0), (0.0, -0.5)) == [False, True, True]
