@@ -77,7 +77,7 @@ def odometry(time, x, y, yaw):
 
 
 def believed(time, x, y, yaw):
-    message = logs.believed(time, x)
+    message = logs.estimated_pose(time, x)
     message.pose.pose = logs.pose(x, y, yaw)
     return message
 
