@@ -22,7 +22,7 @@ from simscen.testing.flatland import setting
 PAGE = File(__file__).parents[2] / "docs/reference/planners.md"
 BEGIN, END = "<!-- figures -->\n", "<!-- end of figures -->"
 SEEDS = range(1, 6)
-HEAD = """| Planner | Found | Cost: mean, greatest | Length | Least clearance, m | Spread, m | ms: median, greatest |
+HEADER = """| Planner | Found | Cost: mean, greatest | Length | Least clearance, m | Spread, m | ms: median, greatest |
 |---|---|---|---|---|---|---|
 """
 PLANNERS: dict[str, PlannerSpec] = {
@@ -92,8 +92,8 @@ def table_row(name: str, spec: PlannerSpec, queries: list[Query]) -> str:
             cost.append(query.path_cost(paths[-1].points[:, :2]) / query.cost)
             length.append(paths[-1].length() / query.length)
             clearance.append(query.min_clearance(paths[-1].points))
-        for one, other in pairwise(paths):
-            spread.append(float(cKDTree(one.points[:, :2]).query(other.points[:, :2])[0].mean()))
+        for first, second in pairwise(paths):
+            spread.append(float(cKDTree(first.points[:, :2]).query(second.points[:, :2])[0].mean()))
     ms = 1000 * np.array(seconds)
     return (
         f"| {name} | {len(cost)} of {len(ms)} | {np.mean(cost):.3f}, {max(cost):.2f} | {np.mean(length):.3f} "
@@ -108,10 +108,10 @@ def main() -> None:
         for number in range(6):
             rng = np.random.default_rng((number, 20))
             queries.append(Query(costmap_of(*world(rng)), rng))
-    table = HEAD + "".join(table_row(name, spec, queries) for name, spec in PLANNERS.items())
+    table = HEADER + "".join(table_row(name, spec, queries) for name, spec in PLANNERS.items())
     print(table)
-    before, rest = PAGE.read_text().split(BEGIN)
-    PAGE.write_text(before + BEGIN + table + END + rest.split(END)[1])
+    before, after = PAGE.read_text().split(BEGIN)
+    PAGE.write_text(before + BEGIN + table + END + after.split(END)[1])
 
 
 if __name__ == "__main__":

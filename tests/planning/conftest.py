@@ -1,3 +1,5 @@
+"""Lets the tests of this folder import generated_worlds."""
+
 import sys
 from pathlib import Path
 

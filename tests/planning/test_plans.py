@@ -37,12 +37,12 @@ def medial_axis(**options: object) -> MedialAxisPlanner:
 @pytest.mark.parametrize("multiplier", [2.0, 5.0])
 @pytest.mark.parametrize("kind", WORLDS)
 @pytest.mark.parametrize(
-    ("planner", "mean", "most"),
+    ("planner", "mean", "maximum"),
     [(ompl, 1.15, 1.35), (medial_axis, 1.02, 1.05)],
     ids=["bit_star", "medial_axis"],
 )
 def test_a_plan_costs_little_more_than_the_optimum(
-    planner: Callable[..., Planner], mean: float, most: float, kind: str, multiplier: float
+    planner: Callable[..., Planner], mean: float, maximum: float, kind: str, multiplier: float
 ) -> None:
     ratios = []
     for seed in range(3):
@@ -56,11 +56,11 @@ def test_a_plan_costs_little_more_than_the_optimum(
         assert np.isfinite(rates.at(points[:, :2])).all()
         ratios.append(rates.along(points[:, :2]) / cheapest_cost(rates, start, goal))
     assert np.mean(ratios) < mean
-    assert max(ratios) < most
+    assert max(ratios) < maximum
 
 
 def test_plan_around_expensive_spots_is_near_optimal(monkeypatch: pytest.MonkeyPatch) -> None:
-    """As among people: often, only the path around expensive cells is searched for, and joined with a straight line."""
+    """The costs are like those around people. Often, the planner searches only near expensive cells."""
     rng, full_searches, expensive = np.random.default_rng(3), list[int](), 0
     monkeypatch.setattr(
         medial_axis_planner, "plan_in_windows", lambda plan, *args: full_searches.append(1) or plan(*args)
@@ -127,12 +127,14 @@ def corridor_with_a_corner() -> Flatland:
 
 
 def min_clearance(points: np.ndarray) -> float:
+    """Return the minimum distance of a path from the walls of the corridor in m."""
     view = costmap_of(corridor_with_a_corner(), 8, 8, inflation_radius=3.0, cost_scaling_factor=0.1)
     columns, rows = ((points[:, i] - view.origin[i]) / view.resolution for i in (0, 1))
     return float(view.distance[rows.astype(int), columns.astype(int)].min())
 
 
 def plan(**costmap: float) -> np.ndarray:
+    """Return the points of a plan around the corner, with parameters of the costmap."""
     view = costmap_of(corridor_with_a_corner(), 8, 8, **costmap)
     return OmplPlanner(Spec(), ROBOT).plan(view, Pose2(1, 6.5), Pose2(6.5, 1), 1).points
 
@@ -169,7 +171,7 @@ def test_allow_unknown_controls_paths_through_unknown_space() -> None:
     assert (view.costs[rows.astype(int), columns.astype(int)] != 255).all()
 
 
-def test_without_simplify_the_path_is_as_the_planner_found_it() -> None:
+def test_path_without_simplification_consists_of_straight_segments_and_costs_more() -> None:
     view = costmap_of(*rooms(np.random.default_rng(3)))
     rates = TraversalCosts(view, ROBOT, 2.0, True)
     ends = random_query(
@@ -178,7 +180,7 @@ def test_without_simplify_the_path_is_as_the_planner_found_it() -> None:
     raw = OmplPlanner(Spec(simplify=False), ROBOT).plan(view, *ends, 1).points
     refined = OmplPlanner(Spec(), ROBOT).plan(view, *ends, 1).points
     turns = np.abs(np.diff(np.unwrap(raw[:-1, 2])))
-    assert np.count_nonzero(turns > 1e-6) < 40  # straight from sample to sample
+    assert np.count_nonzero(turns > 1e-6) < 40  # straight between samples
     assert rates.along(refined[:, :2]) < rates.along(raw[:, :2])
 
 

@@ -45,6 +45,7 @@ def costs_along(rates: TraversalCosts, points: Array) -> np.ndarray:
 
 
 def spec(kind: str, **options: object) -> Spec:
+    """Return the specification of an OMPL planner of this type."""
     return Spec(type=kind, improving_iterations=100, **options)
 
 
@@ -91,13 +92,13 @@ def test_hull_of_a_car_is_collision_free_along_the_plan(
         car = ompl_planner(spec(kind, state_space=space, max_iterations=20_000), setting(CAR))
         points = car.plan(view, with_random_yaw(start, number), with_random_yaw(goal, number + 1), number).points
         points[:, 2] = np.unwrap(points[:, 2])
-        part = (np.arange(50) / 50)[:, None]
-        whole = (points[:-1, None] + part * np.diff(points, axis=0)[:, None]).reshape(-1, 3)
-        assert Footprint(CAR, view.resolution).free(view, whole).all(), number
+        shares = (np.arange(50) / 50)[:, None]
+        dense_points = (points[:-1, None] + shares * np.diff(points, axis=0)[:, None]).reshape(-1, 3)
+        assert Footprint(CAR, view.resolution).free(view, dense_points).all(), number
 
 
 @pytest.mark.parametrize(("world", "number"), [("forest", 601), ("forest", 604), ("rooms", 607), ("forest", 609)])
-def test_aorrtc_never_returns_a_path_of_the_goal_alone(world: str, number: int) -> None:
+def test_aorrtc_never_returns_a_path_of_only_the_goal(world: str, number: int) -> None:
     """Regression: OMPL calls a path that contains only the goal an exact solution."""
     view, start, goal = query(world, number, CAR, 0.45)
     ends = with_random_yaw(start, number), with_random_yaw(goal, number + 1)

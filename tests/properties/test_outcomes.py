@@ -14,7 +14,7 @@ from simscen.testing.synthetic_trace import synthetic_trace
 PASS, FAIL, INCONCLUSIVE, ERROR = Status.PASS, Status.FAIL, Status.INCONCLUSIVE, Status.ERROR
 TRACE = synthetic_trace({"seconds": 1, "truth": [[0, 0, 0, 0]]})
 IDS = ["speed", "speed#2", "stuck", "expected", "expected#2", "door"]
-"""Names of criteria, which may look like the number of a repeated name."""
+"""Names of criteria. Some look like the numbered name of a repeated criterion."""
 DISTURBANCES = ["door", "lidar.off", "speed", "expected"]
 """Names of disturbances, some of which are also names of criteria."""
 
@@ -78,7 +78,7 @@ UNIQUE = st.lists(st.sampled_from(["door", "lidar.off"]), unique=True, max_size=
 @settings(deadline=None, max_examples=300)
 @given(criteria(), disturbances(UNIQUE), st.sets(st.sampled_from(["speed", "stuck", "door", "lidar.off"])))
 def test_run_fails_as_expected_only_if_exactly_the_named_entries_fail(verdicts, outcomes, expected_ids):
-    """The table in docs/guides/variations.md, with the named events and faults, which must not happen."""
+    """The outcome follows the table in docs/guides/variations.md. Named events and faults must not happen."""
     verdicts = [verdict for verdict in verdicts if verdict.id not in {entry.disturbance.name for entry in outcomes}]
     judged = all_verdicts(verdicts, outcomes)
     before = outcome_of_verdicts(judged)

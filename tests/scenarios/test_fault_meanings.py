@@ -1,4 +1,4 @@
-"""Tests of faults in whole runs against independent computations."""
+"""Tests of the effects of faults on readings and motion in whole runs, against independent computations."""
 
 import math
 from pathlib import Path

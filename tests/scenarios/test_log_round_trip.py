@@ -1,6 +1,6 @@
 """Tests that scenarios reconstructed from only their logs agree with the shipped scenarios.
 
-`python tests/campaign/log_round_trip.py` prints the same comparison for all of them.
+`python tests/campaign/log_round_trip.py` prints the same comparison for all shipped scenarios.
 """
 
 import sys

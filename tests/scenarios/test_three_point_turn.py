@@ -12,7 +12,7 @@ TURNING_RADIUS = 0.45 / np.tan(0.51)
 MIN_SPEED_M_S = 0.03
 
 
-def test_a_car_turns_round_in_a_road_too_narrow_for_one_sweep():
+def test_car_turns_around_on_a_road_that_is_too_narrow_for_a_u_turn():
     run = simscen.simulate(ROOT / "scenarios/robots/car_three_point_turn.scenario.yaml")
     trace = run.trace
     assert run.passed

@@ -1,4 +1,4 @@
-"""A robot whose lidar and IMU are mounted upside down drives like one with upright sensors."""
+"""Tests of robots whose lidar and IMU are mounted upside down."""
 
 import math
 from pathlib import Path
@@ -41,7 +41,7 @@ def test_robot_with_inverted_sensors_reaches_its_goal(profile: str, tmp_path: Pa
 
 
 def test_log_has_the_mounts_of_tilted_sensors(tmp_path: Path) -> None:
-    """Read by mcap_ros2: the mounts of lidar and IMU on /tf_static, and the readings of the IMU in its own frame."""
+    """The decoder of mcap_ros2 reads both mounts on /tf_static, and the readings of the IMU in the IMU frame."""
     (tmp_path / "a.robot.yaml").write_text(inverted_turtlebot())
     scenario = tmp_path / "a.scenario.yaml"
     scenario.write_text(
