@@ -47,11 +47,13 @@ def run(tmp_path):
 
 def hash_of_messages(log, robot, seconds):
     """Return a hash of a robot's first messages, except the poses of the other robots."""
-    digest = hashlib.sha256()
+    digest, is_empty = hashlib.sha256(), True
     with log.open("rb") as stream:
         for _, channel, message in make_reader(stream).iter_messages(end_time=int(seconds * 1e9)):
             if channel.topic.startswith(f"/{robot}/") and b"object" not in message.data:
+                is_empty = False
                 digest.update(f"{channel.topic} {message.log_time} ".encode() + message.data)
+    assert not is_empty, f"the log has no messages of robot {robot}"
     return digest.hexdigest()
 
 

@@ -28,7 +28,7 @@ def test_robot_read_back_from_its_urdf_is_the_same(tmp_path, name):
     ]
     assert read_back.chassis.center == pytest.approx(body.chassis.center, abs=1e-6)
     assert read_back.footprint == pytest.approx(np.array(body.footprint), abs=1e-6)
-    for original, solid in zip(body.hull, read_back.hull, strict=False):
+    for original, solid in zip(body.hull, read_back.hull, strict=True):
         points = solid.pose.apply(hull_points(solid.shape))
         assert original.pose.apply(hull_points(original.shape)) == pytest.approx(points, abs=1e-6)
 
