@@ -1,9 +1,13 @@
 """Copies a scenario, and the files that it names, to another folder."""
 
+import json
+import re
 import shutil
 from collections.abc import Iterable, Mapping
 from os.path import commonpath, realpath, relpath
 from pathlib import Path
+
+import yaml
 
 from simscen.core.errors import Problem, UsageError
 from simscen.loading.files.paths import PathSandbox, is_file
@@ -20,6 +24,8 @@ _SEARCHED_SUFFIXES = (".yaml", ".yml")
 """Suffixes of files that are searched for names of further files."""
 _UNSEARCHED_SUFFIXES = (".sdf", ".world", ".urdf", ".xacro")
 """Suffixes of files that can name further files, but cannot be searched. They are not copied."""
+_PLAIN_PATH = re.compile(r"[\w./][\w./ -]*")
+"""Paths that need no quotes in YAML."""
 
 
 def copy_scenario(loaded: LoadedScenario, target: Path, root: Path) -> list[Path]:
@@ -110,9 +116,18 @@ def _with_dependencies(files: Iterable[Path]) -> list[Path]:
 
 def _with_path(text: str, leaf: ScalarNode, path: str) -> str:
     """Return the YAML text with `path` instead of the value of the scalar `leaf`."""
-    lines = text.split("\n")
-    line, start = lines[leaf.position.line - 1], leaf.position.col - 1
-    quote = line[start] if line[start] in "'\"" else ""
-    end = start + len(quote) + len(str(leaf.value)) + len(quote)
-    lines[leaf.position.line - 1] = f"{line[:start]}{quote}{path}{quote}{line[end:]}"
-    return "\n".join(lines)
+    position = leaf.position.line - 1, leaf.position.col - 1  # with an anchor, the scalar begins after it
+    token = next(
+        token
+        for token in yaml.scan(text)
+        if isinstance(token, yaml.ScalarToken) and (token.start_mark.line, token.start_mark.column) >= position
+    )
+    start = token.start_mark.index
+    end = start + len(text[start : token.end_mark.index].rstrip())  # without the line breaks after a block scalar
+    if token.style == '"':
+        scalar = json.dumps(path, ensure_ascii=False)
+    elif token.style == "'" or not _PLAIN_PATH.fullmatch(path):
+        scalar = "'" + path.replace("'", "''") + "'"
+    else:
+        scalar = path
+    return text[:start] + scalar + text[end:]

@@ -3,6 +3,8 @@
 from collections.abc import Callable
 from pathlib import Path
 
+import pytest
+
 from simscen.loading.files.copying import copy_scenario
 from simscen.loading.reduction import with_inline_world
 from simscen.loading.scenario import ChangedScenario, load_scenario
@@ -73,3 +75,20 @@ def test_a_changed_scenario_names_its_files_relative_to_its_new_folder(write: Wr
         again = load_scenario(write(f"results/today/{name}.scenario.yaml", written), tmp_path)
         assert again.world.map is not None
         assert again.world.map.path == tmp_path / "worlds" / "map.yaml"
+
+
+@pytest.mark.parametrize(
+    ("original", "copy"),
+    [
+        ("&w it's.world.yaml  # hall", "&w 'b/it''s.world.yaml'  # hall"),
+        ("'it''s.world.yaml'  # hall", "'b/it''s.world.yaml'  # hall"),
+        ('"it\\u0027s.world.yaml"  # hall', '"b/it\'s.world.yaml"  # hall'),
+        (">-\n  it's.world.yaml\n# hall", "'b/it''s.world.yaml'\n# hall"),
+    ],
+)
+def test_the_text_around_a_path_is_kept_in_any_notation(write: Write, tmp_path: Path, original: str, copy: str) -> None:
+    write("it's.world.yaml", ROOM.format("room"))
+    start, end = f"{BASE}goals: [{{pose: {{x: 4, y: 4}}}}]\nworld: ", "\ndescription: text\n"
+    loaded = load_scenario(write("a.scenario.yaml", start + original + end), tmp_path)
+    copy_scenario(loaded, tmp_path / "new" / "b.scenario.yaml", tmp_path / "new")
+    assert (tmp_path / "new" / "b.scenario.yaml").read_text() == start + copy + end
