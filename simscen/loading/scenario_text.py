@@ -3,9 +3,9 @@
 from collections.abc import Mapping
 from dataclasses import replace
 
-from simscen.core.errors import InvalidInput
+from simscen.core.errors import InvalidInput, Problem
 from simscen.loading.loaded import LoadedScenario
-from simscen.loading.multirobot import split_by_robot
+from simscen.loading.multirobot import has_valid_robots, split_by_robot
 from simscen.loading.named_places import places_of, resolve_criteria_places
 from simscen.loading.plugins import missing_plugins
 from simscen.loading.schema.validate import Model, check
@@ -36,7 +36,7 @@ def criteria_and_tree(text: str, robot: str) -> tuple[CriteriaSpec, MappingNode]
     """
     tree = _read(text, "scenario.yaml")
     if isinstance(tree, MappingNode) and robot:
-        tree = split_by_robot(tree).get(robot, tree)
+        tree = _robot_tree(tree, robot) or tree
     spec = _validated(CriteriaSpec, tree)
     assert isinstance(tree, MappingNode)
     return spec, tree
@@ -46,16 +46,25 @@ def criteria_of_text(text: str, name: str, facts: Mapping[str, str], robot: str 
     """Return the criteria in the scenario text of a log, ignoring the rest of the scenario.
 
     `name` is the path of the text in messages, and `facts` are the header entries of the log. `robot` is the name of
-    one of several robots; "" for the only robot. Raises InvalidInput, also for a plug-in that is not installed in the
-    version of the log.
+    one of several robots; "" for the only robot. Raises InvalidInput, also for a robot that the scenario does not have,
+    and for a plug-in that is not installed in the version of the log.
     """
     if missing := missing_plugins(facts, JUDGING_PLUGINS):
         raise InvalidInput([replace(problem, path=name) for problem in missing])
     tree = _read(text, name)
     if isinstance(tree, MappingNode):
-        tree = split_by_robot(tree)[robot] if robot else tree
-        tree = replace(tree, entries={key: entry for key, entry in tree.entries.items() if key in _JUDGING_KEYS})
+        robot_tree = _robot_tree(tree, robot) if robot else tree
+        if robot_tree is None:
+            message = f"the log is damaged: its scenario has no robot `{robot}`"
+            raise InvalidInput([Problem(name, 0, 0, "SC802", message)])
+        entries = {key: entry for key, entry in robot_tree.entries.items() if key in _JUDGING_KEYS}
+        tree = replace(robot_tree, entries=entries)
     return _validated(CriteriaSpec, tree)
+
+
+def _robot_tree(tree: MappingNode, robot: str) -> MappingNode | None:
+    """Return the scenario of one of several robots; None if the scenario does not have it."""
+    return split_by_robot(tree).get(robot) if has_valid_robots(tree) else None
 
 
 def _read(text: str, name: str) -> Node:

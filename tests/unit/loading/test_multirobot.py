@@ -5,6 +5,7 @@ import pytest
 from simscen.core.errors import InvalidInput
 from simscen.loading.checks.scene_runner import check_in_world
 from simscen.loading.scenario import load_scenario
+from simscen.loading.scenario_text import criteria_of_text
 from tests.scenario_files import try_scenario
 
 HEAD = """\
@@ -168,3 +169,9 @@ def test_a_scenario_of_several_robots_is_not_loaded_by_halves(tmp_path):
     file.write_text(HEAD + f"robots: {{{A}, b: {{pose: nowhere}}}}\n" + PASS)
     with pytest.raises(InvalidInput, match="nowhere"):
         load_scenario(file, tmp_path)
+
+
+@pytest.mark.parametrize("robots", [f"robots: {{{A}, {B}}}\n", "robots: {a: 1}\n", ""])
+def test_a_robot_that_the_text_of_a_log_does_not_have_is_a_problem_of_the_log(robots):
+    with pytest.raises(InvalidInput, match=r"run\.mcap: the log is damaged: its scenario has no robot `c`"):
+        criteria_of_text(HEAD + robots + PASS, "run.mcap", {}, "c")
