@@ -18,7 +18,7 @@ from simscen.testing.fakes import FakeStage
 WIDE_OPEN = Pose2(0.0, 0.0, math.pi / 2)
 
 
-class Swinging(FakeStage):
+class StageWithSwingingDoor(FakeStage):
     def door(self, name):
         return Pose2(0.0, 0.0, 0.0), WIDE_OPEN
 
@@ -27,29 +27,29 @@ def perform(stage, **action):
     return AnyAction.model_validate(action).perform(stage)
 
 
-def moved(stage):
+def motion_of(stage):
     ((_, _, path),) = stage.calls
     return path
 
 
 def test_door_swings_for_its_whole_duration():
-    stage = Swinging(objects={"gate": Pose2(0.0, 0.0, 0.0)})
+    stage = StageWithSwingingDoor(objects={"gate": Pose2(0.0, 0.0, 0.0)})
     assert perform(stage, open={"name": "gate", "duration": 2.0}).happened
-    assert moved(stage).times[-1] == 2.0
-    assert pose_at(moved(stage), 0.5).yaw == pytest.approx(math.pi / 8)
-    assert moved(stage).poses[-1] == WIDE_OPEN
+    assert motion_of(stage).times[-1] == 2.0
+    assert pose_at(motion_of(stage), 0.5).yaw == pytest.approx(math.pi / 8)
+    assert motion_of(stage).poses[-1] == WIDE_OPEN
 
 
 def test_reversed_door_returns_at_the_same_speed():
-    stage = Swinging(objects={"gate": Pose2(0.0, 0.0, math.pi / 6)})
+    stage = StageWithSwingingDoor(objects={"gate": Pose2(0.0, 0.0, math.pi / 6)})
     assert perform(stage, close={"name": "gate", "duration": 1.5}).what == "gate swings shut"
-    assert moved(stage).times[-1] == pytest.approx(0.5)
+    assert motion_of(stage).times[-1] == pytest.approx(0.5)
 
 
 def test_sliding_door_moves_in_a_straight_line():
     stage = FakeStage(objects={"gate": Pose2(0.25, 0.0, 0.0)})
     assert perform(stage, open={"name": "gate", "duration": 2.0}).what == "gate slides open"
-    assert moved(stage) == MotionPath((0.0, 1.5), (Pose2(0.25, 0.0, 0.0), Pose2(1.0, 0.0, 0.0)))
+    assert motion_of(stage) == MotionPath((0.0, 1.5), (Pose2(0.25, 0.0, 0.0), Pose2(1.0, 0.0, 0.0)))
 
 
 def test_sliding_door_tolerates_a_rounded_heading():
@@ -58,16 +58,16 @@ def test_sliding_door_tolerates_a_rounded_heading():
 
 
 def test_door_ajar_is_open_by_the_given_fraction():
-    stage = Swinging(objects={"gate": Pose2(0.0, 0.0, 0.0)})
+    stage = StageWithSwingingDoor(objects={"gate": Pose2(0.0, 0.0, 0.0)})
     assert perform(stage, open={"name": "gate", "to": "30 %", "duration": 1.0}).what == "gate swings 30% open"
-    assert moved(stage).poses[-1].yaw == pytest.approx(0.3 * math.pi / 2)
-    assert moved(stage).times[-1] == pytest.approx(0.3)
+    assert motion_of(stage).poses[-1].yaw == pytest.approx(0.3 * math.pi / 2)
+    assert motion_of(stage).times[-1] == pytest.approx(0.3)
 
 
 def test_opening_an_open_or_opening_door_has_no_effect():
-    assert not perform(Swinging(objects={"gate": WIDE_OPEN}), open={"name": "gate"}).happened
+    assert not perform(StageWithSwingingDoor(objects={"gate": WIDE_OPEN}), open={"name": "gate"}).happened
     opening = MotionPath((0.0, 1.0), (Pose2(0.0, 0.0, 0.0), WIDE_OPEN))
-    stage = Swinging(objects={"gate": Pose2(0.0, 0.0, 0.5)}, motions={"gate": (opening, 0.4)})
+    stage = StageWithSwingingDoor(objects={"gate": Pose2(0.0, 0.0, 0.5)}, motions={"gate": (opening, 0.4)})
     effect = perform(stage, open={"name": "gate"})
     assert (effect.happened, effect.what) == (False, "gate already swings open")
     assert perform(stage, close={"name": "gate"}).happened
@@ -77,15 +77,15 @@ def test_paused_object_continues_from_its_position():
     path = MotionPath((0.0, 4.0), (Pose2(0, 0), Pose2(4, 0)), "back_and_forth", phase=1.0)
     stage = FakeStage(motions={"cart": (path, 1.5)})
     assert perform(stage, stop={"name": "cart", "for": "3 s"}).what == "stopped cart for 3 s"
-    again = moved(stage)
-    assert [pose_at(again, t).x for t in (0.0, 3.0, 4.0, 6.0)] == pytest.approx([2.5, 2.5, 3.5, 2.5])
+    continued = motion_of(stage)
+    assert [pose_at(continued, t).x for t in (0.0, 3.0, 4.0, 6.0)] == pytest.approx([2.5, 2.5, 3.5, 2.5])
 
 
 def test_pause_delays_a_scheduled_start():
     path = MotionPath((0.0, 4.0), (Pose2(0, 0), Pose2(4, 0)), start=2.0)
     stage = FakeStage(motions={"cart": (path, 1.5)})
     assert perform(stage, stop={"name": "cart", "for": 3.0}).happened
-    assert pose_at(moved(stage), 4.0) == Pose2(1.0, 0.0, 0.0)
+    assert pose_at(motion_of(stage), 4.0) == Pose2(1.0, 0.0, 0.0)
 
 
 @pytest.mark.parametrize("elapsed", [0.0, 7.0])
@@ -107,7 +107,7 @@ def test_moving_object_that_passes_its_waypoint_can_be_moved_to_it():
     circuit = MotionPath((0.0, 1.0, 2.0), (Pose2(1, 2), Pose2(2, 2), Pose2(1, 2)), "loop")
     stage = FakeStage(objects={"cart": Pose2(1.0, 2.0, 0.0)}, motions={"cart": (circuit, 2.0)})
     assert perform(stage, move={"name": "cart", "keyframes": [[1, 1, 2, 0]]}).happened
-    assert pose_at(moved(stage), 1.5) == Pose2(1.0, 2.0, 0.0)
+    assert pose_at(motion_of(stage), 1.5) == Pose2(1.0, 2.0, 0.0)
 
 
 def test_stopped_object_stays_at_its_pose():
@@ -128,28 +128,28 @@ def test_force_over_time_gives_its_impulse():
     assert stage.calls == [("push", (15.0, 0.0), None, 1.5), ("push", (0.0, 5.0), "bin", 0.0)]
 
 
-class Heavy(FakeStage):
+class StageWithFixedObjects(FakeStage):
     def mass(self, name):
         return 0.0
 
 
 def test_push_without_a_movable_object_has_no_effect():
     assert not perform(FakeStage(objects={"bin": None}), push={"impulse": [0, 5], "name": "bin"}).happened
-    assert not perform(Heavy(), push={"impulse": [0, 5], "name": "bin"}).happened
+    assert not perform(StageWithFixedObjects(), push={"impulse": [0, 5], "name": "bin"}).happened
     assert not perform(FakeStage(), push={"impulse": [0, 0]}).happened
 
 
 @pytest.mark.parametrize(
-    ("text", "given"),
+    ("text", "keys"),
     {
         "expected either impulse or force": {},
         "a force needs a duration `for`": {"force": [0, 1]},
         "an impulse has no duration `for`": {"impulse": [0, 1], "for": 1.0},
     }.items(),
 )
-def test_invalid_push_is_refused(text, given):
+def test_invalid_push_is_refused(text, keys):
     with pytest.raises(ValidationError, match=text):
-        AnyAction.model_validate({"push": given})
+        AnyAction.model_validate({"push": keys})
 
 
 def test_teleport_moves_an_object_and_reports_the_distance():
@@ -191,7 +191,7 @@ def test_keys_that_would_be_ignored_are_errors(action):
         AnyAction.model_validate(action)
 
 
-class Crowded(FakeStage):
+class StageWithoutFreeSpace(FakeStage):
     def region(self, name):
         return ((0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0))
 
@@ -203,6 +203,8 @@ class Crowded(FakeStage):
 
 
 def test_a_crowd_names_the_region_without_free_space():
-    effect = perform(Crowded(), crowd={"name": "guest", "count": 3, "start": "hall", "goals": ["kitchen"]})
+    effect = perform(
+        StageWithoutFreeSpace(), crowd={"name": "guest", "count": 3, "start": "hall", "goals": ["kitchen"]}
+    )
     assert not effect.happened
     assert effect.what == "added only 0 of 3 people: no more free space in kitchen"

@@ -8,7 +8,7 @@ import pytest
 from simscen.assets.folders import AllowedFolders, NoSuchFile, UnusableFile
 
 
-def put(path: Path) -> Path:
+def create_file(path: Path) -> Path:
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_text("x")
     return path
@@ -25,19 +25,19 @@ def folders(tmp_path: Path) -> AllowedFolders:
 @pytest.mark.parametrize("scheme", ["package://", "model://"])
 def test_packages_are_searched_in_the_documented_order(folders: AllowedFolders, scheme: str) -> None:
     root, models = folders.roots
-    beside = root / "shop" / "worlds"
+    base_folder = root / "shop" / "worlds"
     found = []
-    for holder in (root / "vendor" / "ros", root / "shop", models):
-        put(holder / "cart" / "base.stl")
-        found.append(folders.find(f"{scheme}cart/base.stl", beside).parents[1])
+    for folder in (root / "vendor" / "ros", root / "shop", models):
+        create_file(folder / "cart" / "base.stl")
+        found.append(folders.find(f"{scheme}cart/base.stl", base_folder).parents[1])
     assert found == [root / "vendor" / "ros", root / "shop", models]
 
 
 @pytest.mark.parametrize("other", ["include/cart", "cart", "build/cart", "install/cart"])
 def test_a_package_comes_before_other_folders_with_its_name(folders: AllowedFolders, other: str) -> None:
     root, _ = folders.roots
-    put(root / "repository" / other / "cart.hpp")
-    put(root / other / "cart.hpp")
+    create_file(root / "repository" / other / "cart.hpp")
+    create_file(root / other / "cart.hpp")
     assert folders.package_folder("cart", root / "repository" / "urdf") != root / "repository"
     (root / "repository" / "package.xml").write_text("<package><name>cart</name></package>")
     assert folders.package_folder("cart", root / "repository" / "urdf") == root / "repository"
@@ -45,7 +45,7 @@ def test_a_package_comes_before_other_folders_with_its_name(folders: AllowedFold
 
 def test_a_package_is_found_by_the_name_in_its_package_xml(folders: AllowedFolders) -> None:
     root, _ = folders.roots
-    mesh = put(root / "src" / "cart_repository" / "base.stl")
+    mesh = create_file(root / "src" / "cart_repository" / "base.stl")
     manifest = mesh.parent / "package.xml"
     manifest.write_text("<package><!-- <name>other</name> -->\n <name> cart </name></package>")
     assert folders.find("package://cart/base.stl", root / "worlds") == mesh
@@ -68,7 +68,7 @@ def test_the_search_for_missing_packages_lists_each_folder_once(
     folders: AllowedFolders, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     root, models = folders.roots
-    put(root / "robots" / "cart" / "base.stl")
+    create_file(root / "robots" / "cart" / "base.stl")
     (root / "round").symlink_to(root / "round")
     listed, scandir = [], os.scandir
     monkeypatch.setattr(os, "scandir", lambda path: listed.append(Path(path)) or scandir(path))
@@ -81,30 +81,30 @@ def test_the_search_for_missing_packages_lists_each_folder_once(
 
 def test_a_package_with_a_specified_path_is_not_searched(folders: AllowedFolders, tmp_path: Path) -> None:
     root, models = folders.roots
-    put(models / "cart" / "base.stl")
-    own = put(root / "vendor" / "base.stl")
-    given = AllowedFolders(folders.roots, {"cart": root / "vendor"})
-    assert given.find("package://cart/base.stl", root) == own
+    create_file(models / "cart" / "base.stl")
+    file = create_file(root / "vendor" / "base.stl")
+    with_package_path = AllowedFolders(folders.roots, {"cart": root / "vendor"})
+    assert with_package_path.find("package://cart/base.stl", root) == file
     with pytest.raises(NoSuchFile, match="no such file"):
-        given.find("package://cart/wheel.stl", root)
+        with_package_path.find("package://cart/wheel.stl", root)
 
 
-@pytest.mark.parametrize("written", ["base.stl", "file://base.stl", "./base.stl"])
-def test_relative_path_is_searched_next_to_the_file_first(folders: AllowedFolders, written: str) -> None:
+@pytest.mark.parametrize("uri", ["base.stl", "file://base.stl", "./base.stl"])
+def test_relative_path_is_searched_next_to_the_file_first(folders: AllowedFolders, uri: str) -> None:
     root, models = folders.roots
-    there = put(models / "base.stl")
-    assert folders.find(written, root) == there
-    near = put(root / "base.stl")
-    assert folders.find(written, root) == near
+    distant_file = create_file(models / "base.stl")
+    assert folders.find(uri, root) == distant_file
+    adjacent_file = create_file(root / "base.stl")
+    assert folders.find(uri, root) == adjacent_file
 
 
 def test_file_with_a_no_break_space_in_its_name_is_found(folders: AllowedFolders, tmp_path: Path) -> None:
-    file = put(tmp_path / "root/a\u00a0b.stl")
+    file = create_file(tmp_path / "root/a\u00a0b.stl")
     assert folders.find(file.name, file.parent) == file
 
 
 @pytest.mark.parametrize(
-    ("written", "why"),
+    ("uri", "message"),
     [
         ("", "the URI is empty"),
         ("a\nb", "the URI contains a control character"),
@@ -122,27 +122,27 @@ def test_file_with_a_no_break_space_in_its_name_is_found(folders: AllowedFolders
     ],
 )
 def test_missing_file_message_reveals_nothing_outside(
-    folders: AllowedFolders, tmp_path: Path, written: str, why: str
+    folders: AllowedFolders, tmp_path: Path, uri: str, message: str
 ) -> None:
     root, _ = folders.roots
-    put(tmp_path / "secret.stl")
+    create_file(tmp_path / "secret.stl")
     (root / "link.stl").symlink_to(tmp_path / "secret.stl")
     (root / "round.stl").symlink_to(root / "round.stl")
     with pytest.raises(UnusableFile) as caught:
-        folders.find(written, root)
-    assert str(caught.value) == why
+        folders.find(uri, root)
+    assert str(caught.value) == message
 
 
 def test_an_absolute_path_inside_the_root_is_read_if_allowed(folders: AllowedFolders) -> None:
-    there = put(folders.roots[0] / "base.stl")
-    assert folders.find(str(there), folders.roots[1], allow_absolute=True) == there
+    distant_file = create_file(folders.roots[0] / "base.stl")
+    assert folders.find(str(distant_file), folders.roots[1], allow_absolute=True) == distant_file
     with pytest.raises(UnusableFile, match="outside"):
         folders.find("/etc/passwd", folders.roots[1], allow_absolute=True)
 
 
 def test_missing_file_message_lists_similar_files(folders: AllowedFolders) -> None:
     root, models = folders.roots
-    put(models / "cart" / "Base.stl")
+    create_file(models / "cart" / "Base.stl")
     with pytest.raises(NoSuchFile) as caught:
         folders.find("package://cart/base.stl", root)
     assert caught.value.hint == "did you mean `cart/Base.stl`?"
@@ -158,7 +158,7 @@ def test_hint_without_allowed_folders_lists_none(tmp_path: Path) -> None:
 
 
 def test_hint_for_a_file_that_its_package_lacks_names_the_package(tmp_path: Path) -> None:
-    put(tmp_path / "vendor" / "cart" / "package.xml")
+    create_file(tmp_path / "vendor" / "cart" / "package.xml")
     with pytest.raises(NoSuchFile) as caught:
         AllowedFolders.of([tmp_path]).find("package://cart/meshes/base.stl", tmp_path)
     assert caught.value.hint == "the folder of its package is vendor/cart"

@@ -1,3 +1,5 @@
+"""Tests of error codes in criteria and events."""
+
 import pytest
 from pydantic import TypeAdapter, ValidationError
 
@@ -8,21 +10,21 @@ from simscen.criteria.error_codes import ErrorCodeValue, error_code_name
 ADAPTER = TypeAdapter(ErrorCodeValue)
 
 
-@pytest.mark.parametrize("written", ["GOAL_OCCUPIED", 206, ErrorCode.GOAL_OCCUPIED])
-def test_error_code_can_be_a_name_or_number(written):
-    assert ADAPTER.validate_python(written) is ErrorCode.GOAL_OCCUPIED
+@pytest.mark.parametrize("value", ["GOAL_OCCUPIED", 206, ErrorCode.GOAL_OCCUPIED])
+def test_error_code_can_be_a_name_or_number(value):
+    assert ADAPTER.validate_python(value) is ErrorCode.GOAL_OCCUPIED
 
 
-@pytest.mark.parametrize("written", ["GOAL_OCUPIED", 999, True, 206.0, None, "206"])
-def test_unknown_error_code_is_refused_with_the_valid_names(written):
+@pytest.mark.parametrize("value", ["GOAL_OCUPIED", 999, True, 206.0, None, "206"])
+def test_unknown_error_code_is_refused_with_the_valid_names(value):
     with pytest.raises(ValidationError, match="GOAL_OCCUPIED"):
-        ADAPTER.validate_python(written)
+        ADAPTER.validate_python(value)
 
 
 def test_schema_of_error_codes_lists_names_and_numbers():
-    allowed = ADAPTER.json_schema()["enum"]
-    assert "GOAL_OCCUPIED" in allowed
-    assert 206 in allowed
+    values = ADAPTER.json_schema()["enum"]
+    assert "GOAL_OCCUPIED" in values
+    assert 206 in values
 
 
 @pytest.mark.parametrize(

@@ -22,7 +22,7 @@ CHOICES = AnyCriterion.choices()
 HEADINGS = ["What is measured:", "When it fails:", "Why this:", "Source:", "Example:"]
 NUMBERS = st.floats(min_value=-1e6, max_value=1e6)
 
-DRIVE = {
+TRACE = {
     "seconds": 8,
     "truth": [[0, 0, 0], [4, 2, 0.5], [8, 2.5, 0.5]],
     "events": [
@@ -58,49 +58,57 @@ def test_docstring_has_required_sections_and_a_valid_example(kind):
 
 
 @pytest.mark.parametrize("kind", CHOICES)
-def test_the_same_trace_gives_the_same_findings_and_at_least_one(kind):
-    criterion, trace, case = example(kind).chosen, synthetic_trace(DRIVE), synthetic_case(CASE)
+def test_the_same_trace_gives_the_same_findings(kind):
+    criterion, trace, case = example(kind).chosen, synthetic_trace(TRACE), synthetic_case(CASE)
     first, second = criterion.judge(trace, case), criterion.judge(trace, case)
     assert first
     assert first == second
 
 
 def test_a_margin_has_the_sign_of_the_status():
-    measured = set()
+    kinds_with_margin = set()
     for kind in CHOICES:
-        for finding in example(kind).chosen.judge(synthetic_trace(DRIVE), synthetic_case(CASE)):
+        for finding in example(kind).chosen.judge(synthetic_trace(TRACE), synthetic_case(CASE)):
             if finding.margin is not None:
-                measured.add(kind)
+                kinds_with_margin.add(kind)
                 assert (finding.status is Status.PASS) == (finding.margin >= 0)
-    assert measured >= {"goals_reached", "clearance", "time_to_goal", "path_length", "speed", "stuck", "replans"}
+    assert kinds_with_margin >= {
+        "goals_reached",
+        "clearance",
+        "time_to_goal",
+        "path_length",
+        "speed",
+        "stuck",
+        "replans",
+    }
 
 
 @pytest.mark.parametrize("kind", CHOICES)
-def test_nothing_passes_on_a_truncated_log(kind):
-    (verdict,) = judge([example(kind)], synthetic_trace({**DRIVE, "ended": None}), synthetic_case(CASE))
+def test_no_criterion_passes_on_a_truncated_log(kind):
+    (verdict,) = judge([example(kind)], synthetic_trace({**TRACE, "ended": None}), synthetic_case(CASE))
     assert verdict.status is not Status.PASS
 
 
-def nothing_in(seconds):
-    """A whole log, to its proper end, in which nothing was recorded."""
+def trace_without_messages(seconds):
+    """Return the trace of a complete log without messages."""
     trace = synthetic_trace({"seconds": seconds, "truth": [[0, 0, 0]], "belief": None, "scans": []})
-    none = Samples(np.empty(0, dtype=np.int64), np.empty((0, 3)))
-    far = Samples(none.ticks, np.empty((0, 1)))
-    return replace(trace, truth=none, velocity=none, clearance=far, odometry=none, command=none)
+    empty = Samples(np.empty(0, dtype=np.int64), np.empty((0, 3)))
+    no_clearance = Samples(empty.ticks, np.empty((0, 1)))
+    return replace(trace, truth=empty, velocity=empty, clearance=no_clearance, odometry=empty, command=empty)
 
 
 @pytest.mark.parametrize("kind", CHOICES)
 @pytest.mark.parametrize("seconds", [0, 8])
 @pytest.mark.parametrize("case", [CASE, {}], ids=["with goals", "without goals"])
 def test_complete_log_without_messages_does_not_pass(kind, seconds, case):
-    (verdict,) = judge([example(kind)], nothing_in(seconds), synthetic_case(case))
+    (verdict,) = judge([example(kind)], trace_without_messages(seconds), synthetic_case(case))
     assert verdict.status in (Status.FAIL, Status.INCONCLUSIVE), verdict
 
 
 @pytest.mark.parametrize("kind", ["path_length", "speed", "stopped_within", "localization_error", "goals_reached"])
 def test_nan_in_the_truth_is_an_error_with_its_time(kind):
     truth = [[0, 0, 0], [4, 2, math.nan], [4.1, 2, 0.5], [8, 2.5, 0.5]]
-    (verdict,) = judge([example(kind)], synthetic_trace({**DRIVE, "truth": truth}), synthetic_case(CASE))
+    (verdict,) = judge([example(kind)], synthetic_trace({**TRACE, "truth": truth}), synthetic_case(CASE))
     assert verdict.status is Status.ERROR
     assert re.search(r"not finite at t = [\d.]+ s", verdict.findings[0].measured)
 
@@ -126,9 +134,9 @@ def test_texts_of_two_different_numbers_differ(value, limit):
 
 @given(st.integers(0, 50), st.integers(0, 50), st.integers(0, 50))
 def test_counts_are_bounded_on_both_sides(count, low, high):
-    below, above = counted("x", count, "thing", low, high)
-    assert (below.status is Status.PASS) == (count >= low)
-    assert (above.status is Status.PASS) == (count <= high)
+    minimum, maximum = counted("x", count, "thing", low, high)
+    assert (minimum.status is Status.PASS) == (count >= low)
+    assert (maximum.status is Status.PASS) == (count <= high)
 
 
 def test_comparison_with_nan_is_refused():

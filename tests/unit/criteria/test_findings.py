@@ -9,7 +9,7 @@ from simscen.testing.synthetic_trace import synthetic_trace
 
 
 @pytest.mark.parametrize(
-    ("value", "limit", "measured", "text"),
+    ("value", "limit", "value_text", "limit_text"),
     [
         (0.5, 0.25, "0.50 m", "≤ 0.25 m"),
         (0.5, 0.5, "0.50 m", "≤ 0.50 m"),
@@ -24,9 +24,9 @@ from simscen.testing.synthetic_trace import synthetic_trace
         (0.5, math.inf, "0.50 m", "≤ inf m"),
     ],
 )
-def test_numbers_have_enough_digits_to_differ(value, limit, measured, text):
+def test_numbers_have_enough_digits_to_differ(value, limit, value_text, limit_text):
     finding = at_most("x", value, limit, "m")
-    assert (finding.measured, finding.limit) == (measured, text)
+    assert (finding.measured, finding.limit) == (value_text, limit_text)
 
 
 @pytest.mark.parametrize(("value", "detail"), [(0.4, ()), (0.5, ()), (0.6, ("why",))])
@@ -41,15 +41,15 @@ def test_scope_is_written_after_the_limit():
 
 
 def test_counts_are_written_with_a_noun():
-    (few,) = counted("x", 1, "recovery", 2, None)
-    (many,) = counted("x", 2, "recovery", None, 3)
-    assert (few.measured, few.limit, few.margin, few.value) == ("1 recovery", "≥ 2", -1.0, 1.0)
-    assert (many.measured, many.limit, many.margin, many.value) == ("2 recoveries", "≤ 3", 1.0, 2.0)
+    (minimum,) = counted("x", 1, "recovery", 2, None)
+    (maximum,) = counted("x", 2, "recovery", None, 3)
+    assert (minimum.measured, minimum.limit, minimum.margin, minimum.value) == ("1 recovery", "≥ 2", -1.0, 1.0)
+    assert (maximum.measured, maximum.limit, maximum.margin, maximum.value) == ("2 recoveries", "≤ 3", 1.0, 2.0)
     assert counted("x", 0, "replan", 0, None)[0].measured == "0 replans"
     assert counted("x", 2, "delay", 0, None)[0].measured == "2 delays"
 
 
-def test_position_of_a_finding_is_that_at_its_time():
+def test_a_finding_has_the_position_of_the_robot_at_its_time():
     trace = synthetic_trace({"seconds": 4, "truth": [[0, 0, 0], [4, 4, 2]]})
     finding = missed("x", "a", "b", (trace, 480), ["why"])
     assert (finding.tick, finding.place, finding.detail) == (480, (2.0, 1.0), ("why",))

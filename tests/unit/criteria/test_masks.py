@@ -19,8 +19,8 @@ from simscen.judge.evaluation import judge
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
 SEEDS = st.integers(0, 2**32 - 1)
-LONG = [[-0.4, -0.1], [0.3, -0.2], [0.5, 0.0], [0.3, 0.2], [-0.4, 0.1]]
-NOTCHED = [[-0.4, -0.3], [0.4, -0.3], [0.4, 0.3], [0.0, 0.0], [-0.4, 0.3]]
+LONG_FOOTPRINT = [[-0.4, -0.1], [0.3, -0.2], [0.5, 0.0], [0.3, 0.2], [-0.4, 0.1]]
+NOTCHED_FOOTPRINT = [[-0.4, -0.3], [0.4, -0.3], [0.4, 0.3], [0.0, 0.0], [-0.4, 0.3]]
 
 
 def mask_of(rng, values, share):
@@ -29,7 +29,7 @@ def mask_of(rng, values, share):
     return OccupancyGrid(cells, float(rng.uniform(0.1, 0.5)), origin)
 
 
-def judged(criterion, grid, truth, footprint=(), seconds=10.0):
+def findings_and_trace(criterion, grid, truth, footprint=(), seconds=10.0):
     mask = mask_blocks(grid)
     case = synthetic_case({
         "footprint": footprint,
@@ -42,7 +42,7 @@ def judged(criterion, grid, truth, footprint=(), seconds=10.0):
 
 
 def area_of(grid):
-    """All occupied cells, one by one."""
+    """Return the squares of all occupied cells."""
     boxes = []
     for row, column in np.argwhere(grid.cells == 100):
         corners = np.array([[column, row], [column + 1, row], [column + 1, row + 1], [column, row + 1]], dtype=float)
@@ -51,27 +51,29 @@ def area_of(grid):
 
 
 def placed(outline, x, y, yaw):
-    turned = shapely.affinity.rotate(shapely.Polygon(outline), yaw, origin=(0, 0), use_radians=True)
-    return shapely.affinity.translate(turned, x, y)
+    rotated = shapely.affinity.rotate(shapely.Polygon(outline), yaw, origin=(0, 0), use_radians=True)
+    return shapely.affinity.translate(rotated, x, y)
 
 
-@given(SEEDS, st.sampled_from([LONG, NOTCHED]))
+@given(SEEDS, st.sampled_from([LONG_FOOTPRINT, NOTCHED_FOOTPRINT]))
 @settings(deadline=None)
-def test_distance_to_a_keepout_mask_equals_that_of_shapely(seed, hull):
+def test_distance_to_a_keepout_mask_equals_that_of_shapely(seed, outline):
     rng = np.random.default_rng(seed)
     grid = mask_of(rng, [40, 100, 100], share=0.3)
     x, y, yaw = *rng.uniform(-3, 3, 2), rng.uniform(-3, 3)
-    (finding,), _ = judged({"keepout": {"mask": "a.yaml"}}, grid, [[0, x, y, yaw]], hull, seconds=0.1)
-    area, here = area_of(grid), placed(hull, x, y, yaw)
+    (finding,), _ = findings_and_trace({"keepout": {"mask": "a.yaml"}}, grid, [[0, x, y, yaw]], outline, seconds=0.1)
+    area, footprint = area_of(grid), placed(outline, x, y, yaw)
     if not len(area.geoms):
         assert finding.status is Status.INCONCLUSIVE
-    elif (gap := here.distance(area)) > 1e-9:
+    elif (distance := footprint.distance(area)) > 1e-9:
         assert finding.status is Status.PASS
-        assert finding.value == pytest.approx(gap, abs=1e-9)
-    elif here.intersection(area).area > 1e-9:
+        assert finding.value == pytest.approx(distance, abs=1e-9)
+    elif footprint.intersection(area).area > 1e-9:
         assert finding.status is Status.FAIL
-        out = here.bounds[2] - here.bounds[0] + here.bounds[3] - here.bounds[1] + 7 * grid.resolution
-        assert -out < finding.value < 0
+        max_depth = (
+            footprint.bounds[2] - footprint.bounds[0] + footprint.bounds[3] - footprint.bounds[1] + 7 * grid.resolution
+        )
+        assert -max_depth < finding.value < 0
 
 
 @given(SEEDS)
@@ -79,23 +81,23 @@ def test_distance_to_a_keepout_mask_equals_that_of_shapely(seed, hull):
 def test_distance_of_a_drive_to_a_keepout_mask_is_that_of_its_nearest_pose(seed):
     rng = np.random.default_rng(seed)
     grid = mask_of(rng, [100], share=0.1)
-    way = [[t, *rng.uniform(-3, 3, 2), rng.uniform(-3, 3)] for t in (0, 2, 4)]
-    (finding,), trace = judged({"keepout": {"mask": "a.yaml"}}, grid, way, LONG, seconds=4)
+    poses = [[t, *rng.uniform(-3, 3, 2), rng.uniform(-3, 3)] for t in (0, 2, 4)]
+    (finding,), trace = findings_and_trace({"keepout": {"mask": "a.yaml"}}, grid, poses, LONG_FOOTPRINT, seconds=4)
     area = area_of(grid)
     if not len(area.geoms):
         return
-    gaps = [placed(LONG, *pose).distance(area) for pose in trace.truth.values]
+    distances = [placed(LONG_FOOTPRINT, *pose).distance(area) for pose in trace.truth.values]
     step = 0.06 * (1 + np.abs(np.diff(np.unwrap(trace.truth.values[:, 2]))).max())
-    if min(gaps) > 1e-9:
-        assert finding.value <= min(gaps) + 1e-9
-        assert finding.value >= min(gaps) - step - np.hypot(*np.diff(trace.truth.values[:, :2], axis=0).T).max()
+    if min(distances) > 1e-9:
+        assert finding.value <= min(distances) + 1e-9
+        assert finding.value >= min(distances) - step - np.hypot(*np.diff(trace.truth.values[:, :2], axis=0).T).max()
     else:
         assert finding.value <= 1e-9
 
 
 def test_a_round_robot_without_a_footprint_is_judged_by_its_radius():
     grid = OccupancyGrid(np.full((10, 10), 100, dtype=np.int8), 0.1, Pose2(2.0, -0.5))
-    (finding,), _ = judged({"keepout": {"mask": "a.yaml"}}, grid, [[0, 0, 0], [10, 1, 0]])
+    (finding,), _ = findings_and_trace({"keepout": {"mask": "a.yaml"}}, grid, [[0, 0, 0], [10, 1, 0]])
     assert finding.value == pytest.approx(0.8)
 
 
@@ -104,10 +106,10 @@ def test_a_round_robot_without_a_footprint_is_judged_by_its_radius():
 def test_speed_limit_is_that_of_the_cell_at_the_true_pose(seed, grace):
     rng = np.random.default_rng(seed)
     grid = mask_of(rng, [20, 60], share=0.6)
-    way = [[t, *rng.uniform(-1.5, 1.5, 2)] for t in range(0, 5)]
-    how = {"file": "a.yaml", "base": 100.0, "multiplier": -1.0}
-    criterion = {"speed": {"mask": how, "full_speed": 1.0, "tolerance": 0.0, "grace": grace}}
-    (finding,), trace = judged(criterion, grid, way, seconds=4)
+    poses = [[t, *rng.uniform(-1.5, 1.5, 2)] for t in range(0, 5)]
+    speed_mask = {"file": "a.yaml", "base": 100.0, "multiplier": -1.0}
+    criterion = {"speed": {"mask": speed_mask, "full_speed": 1.0, "tolerance": 0.0, "grace": grace}}
+    (finding,), trace = findings_and_trace(criterion, grid, poses, seconds=4)
     ticks, speed = trace.velocity.ticks, np.hypot(*trace.velocity.values[:, :2].T)
     values = grid.values_at(trace.truth.at(ticks)[:, :2])
     limits = [1.0 - value / 100 if value > 0 else math.inf for value in values]
@@ -136,7 +138,7 @@ def test_missing_mask_in_the_log_is_not_a_pass():
 
 
 @pytest.mark.parametrize(
-    ("criterion", "words"),
+    ("criterion", "message"),
     [
         ({"keepout": {}}, "expected either region or mask"),
         ({"keepout": {"region": "wet", "mask": "a.yaml"}}, "expected either region or mask"),
@@ -153,16 +155,16 @@ def test_missing_mask_in_the_log_is_not_a_pass():
         ),
     ],
 )
-def test_contradictory_values_are_refused(criterion, words):
-    with pytest.raises(ValueError, match=words):
+def test_contradictory_values_are_refused(criterion, message):
+    with pytest.raises(ValueError, match=message):
         AnyCriterion.model_validate(criterion)
 
 
 @given(SEEDS)
 def test_windowed_maximum_equals_brute_force(seed):
-    """Against a comparison with each other sample; some are exactly at the end of the reach."""
+    """The expected maxima compare all pairs of samples; some pairs have exactly the distance of the window."""
     rng = np.random.default_rng(seed)
     ticks = np.unique(rng.integers(0, 60, 20))
-    values, reach = rng.normal(size=len(ticks)) - 5.0, int(rng.integers(0, 15))
-    expected = [values[np.abs(ticks - tick) <= reach].max() for tick in ticks]
-    assert _sliding_maximum(values, ticks, reach).tolist() == expected
+    values, reach_ticks = rng.normal(size=len(ticks)) - 5.0, int(rng.integers(0, 15))
+    expected = [values[np.abs(ticks - tick) <= reach_ticks].max() for tick in ticks]
+    assert _sliding_maximum(values, ticks, reach_ticks).tolist() == expected

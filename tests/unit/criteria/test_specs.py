@@ -7,12 +7,12 @@ from simscen.criteria.base import Criterion
 from simscen.criteria.registry import AnyCriterion
 
 
-def spec(kind, words):
-    return AnyCriterion.model_validate({kind: words}).chosen
+def spec(kind, keys):
+    return AnyCriterion.model_validate({kind: keys}).chosen
 
 
 @pytest.mark.parametrize(
-    ("kind", "words"),
+    ("kind", "keys"),
     [
         ("speed", {"max": 1}),
         ("speed", {"max_turn_rate": 1}),
@@ -34,12 +34,12 @@ def spec(kind, words):
         ("clearance", {"min": 0}),
     ],
 )
-def test_each_bound_is_optional(kind, words):
-    assert spec(kind, words).model_dump(exclude_unset=True) == words
+def test_each_bound_is_optional(kind, keys):
+    assert spec(kind, keys).model_dump(exclude_unset=True) == keys
 
 
 @pytest.mark.parametrize(
-    ("kind", "words"),
+    ("kind", "keys"),
     [
         ("speed", {}),
         ("path_length", {}),
@@ -64,13 +64,13 @@ def test_each_bound_is_optional(kind, words):
         ("speed", {"max": 1, "in": "wet", "grace": 1}),
     ],
 )
-def test_criterion_without_a_valid_bound_is_refused(kind, words):
+def test_criterion_without_a_valid_bound_is_refused(kind, keys):
     with pytest.raises(ValidationError):
-        spec(kind, words)
+        spec(kind, keys)
 
 
 @pytest.mark.parametrize(
-    ("kind", "words", "meant"),
+    ("kind", "keys", "defaults"),
     [
         ("keepout", {"region": "wet"}, {"distance": 0.0}),
         ("no_false_success", {}, {"tolerance": 1.0}),
@@ -90,9 +90,9 @@ def test_criterion_without_a_valid_bound_is_refused(kind, words):
         ),
     ],
 )
-def test_defaults_match_the_reference(kind, words, meant):
-    found = spec(kind, words)
-    assert {key: getattr(found, key) for key in meant} == meant
+def test_defaults_match_the_reference(kind, keys, defaults):
+    found = spec(kind, keys)
+    assert {key: getattr(found, key) for key in defaults} == defaults
 
 
 def test_only_clearance_needs_clearance_up_to_half_a_meter_beyond_its_bound():

@@ -1,3 +1,5 @@
+"""Tests of verdicts, outcomes of runs, and checks of the findings of plug-ins."""
+
 import math
 from dataclasses import replace
 
@@ -19,8 +21,8 @@ TRACE = synthetic_trace({"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]], "clearan
 CASE = synthetic_case({})
 
 
-def criterion(**words):
-    return AnyCriterion.model_validate(words)
+def criterion(**keys):
+    return AnyCriterion.model_validate(keys)
 
 
 def verdict(status, severity="fail"):
@@ -46,10 +48,10 @@ def test_verdicts_are_in_the_order_of_the_criteria():
 
 def test_exception_in_a_criterion_is_an_error_verdict_for_this_criterion_only(monkeypatch):
     monkeypatch.setattr(Clearance, "judge", lambda *_: 1 / 0)
-    broken, fine = judge([criterion(clearance={"min": 0.1}), criterion(collisions={})], TRACE, CASE)
-    assert broken.status is Status.ERROR
-    assert broken.findings[0].measured == "ZeroDivisionError: division by zero"
-    assert fine.status is Status.PASS
+    clearance, collisions = judge([criterion(clearance={"min": 0.1}), criterion(collisions={})], TRACE, CASE)
+    assert clearance.status is Status.ERROR
+    assert clearance.findings[0].measured == "ZeroDivisionError: division by zero"
+    assert collisions.status is Status.PASS
 
 
 def test_criterion_without_findings_is_an_error(monkeypatch):
@@ -95,20 +97,20 @@ def test_warnings_do_not_fail_a_run_but_errors_in_warnings_do(verdicts, expected
 
 
 def without_signals(trace):
-    none = Samples(np.empty(0, dtype=np.int64), np.empty((0, 3)))
-    return replace(trace, truth=none, velocity=none, belief=none, odometry=none, command=none)
+    empty = Samples(np.empty(0, dtype=np.int64), np.empty((0, 3)))
+    return replace(trace, truth=empty, velocity=empty, belief=empty, odometry=empty, command=empty)
 
 
 def test_log_without_signals_and_events_does_not_pass():
-    few = [criterion(recoveries={"max": 5})]
-    (empty,) = judge(few, without_signals(TRACE), CASE)
+    criteria = [criterion(recoveries={"max": 5})]
+    (empty,) = judge(criteria, without_signals(TRACE), CASE)
     assert empty.status is Status.INCONCLUSIVE
     assert empty.findings[0].measured == "0 recoveries in an empty log"
     accepted = Event(5, EventKind.GOAL_ACCEPTED, "a")
-    (spoken,) = judge(few, replace(without_signals(TRACE), events=(accepted, *TRACE.events)), CASE)
-    assert spoken.status is Status.PASS
-    (seen,) = judge(few, replace(without_signals(TRACE), truth=TRACE.truth), CASE)
-    assert seen.status is Status.PASS
+    (with_event,) = judge(criteria, replace(without_signals(TRACE), events=(accepted, *TRACE.events)), CASE)
+    assert with_event.status is Status.PASS
+    (with_truth,) = judge(criteria, replace(without_signals(TRACE), truth=TRACE.truth), CASE)
+    assert with_truth.status is Status.PASS
 
 
 GOOD = Finding(Status.PASS, "value", "1 m", "≥ 0 m", 1.0, "m", 1.0)

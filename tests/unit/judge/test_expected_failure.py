@@ -14,12 +14,14 @@ def verdict(name: str, status: Status, criterion: str = "", severity: str = "fai
     return Verdict(criterion or name, name, severity, (Finding(status, name, "1", "2"),))
 
 
-def judged(
-    expected: ExpectedFailure | None, *verdicts: Verdict, whole: bool = True, happened: tuple[str, ...] = ()
+def outcome_and_text(
+    expected: ExpectedFailure | None, *verdicts: Verdict, is_complete: bool = True, happened: tuple[str, ...] = ()
 ) -> tuple[Outcome, str]:
     """Return the outcome, and the measured text of the verdict on the expectation."""
-    outcome, verdict_on_it = apply_expectation(expected, verdicts, outcome_of_verdicts(verdicts), whole, happened)
-    return outcome, "" if verdict_on_it is None else verdict_on_it.findings[0].measured
+    outcome, expectation_verdict = apply_expectation(
+        expected, verdicts, outcome_of_verdicts(verdicts), is_complete, happened
+    )
+    return outcome, "" if expectation_verdict is None else expectation_verdict.findings[0].measured
 
 
 KNOWN = ExpectedFailure("NAV-1")
@@ -49,19 +51,22 @@ def test_exactly_the_expected_criteria_must_fail(
     expected: ExpectedFailure | None, statuses: tuple[Status, Status], outcome: Outcome, text: str
 ) -> None:
     verdicts = [verdict(name, status) for name, status in zip(("speed", "clearance"), statuses, strict=True)]
-    assert judged(expected, *verdicts) == (outcome, text)
+    assert outcome_and_text(expected, *verdicts) == (outcome, text)
 
 
 def test_all_named_criteria_must_fail() -> None:
     both = ExpectedFailure("NAV-1", ("speed", "clearance"))
-    assert judged(both, verdict("speed", FAIL), verdict("clearance", PASS)) == (Outcome.FAILED, "clearance passed")
+    assert outcome_and_text(both, verdict("speed", FAIL), verdict("clearance", PASS)) == (
+        Outcome.FAILED,
+        "clearance passed",
+    )
 
 
 def test_a_disturbance_that_did_not_happen_is_expected_only_by_its_name() -> None:
     missing = verdict("door", FAIL, DISTURBANCE)
-    assert judged(KNOWN, missing, verdict("speed", FAIL)) == (Outcome.FAILED, "speed failed")
-    assert judged(KNOWN, missing, verdict("speed", PASS)) == (Outcome.FAILED, "everything passed")
-    assert judged(ExpectedFailure("NAV-1", ("door",)), missing)[0] is Outcome.FAILED_AS_EXPECTED
+    assert outcome_and_text(KNOWN, missing, verdict("speed", FAIL)) == (Outcome.FAILED, "speed failed")
+    assert outcome_and_text(KNOWN, missing, verdict("speed", PASS)) == (Outcome.FAILED, "everything passed")
+    assert outcome_and_text(ExpectedFailure("NAV-1", ("door",)), missing)[0] is Outcome.FAILED_AS_EXPECTED
 
 
 @pytest.mark.parametrize(
@@ -78,22 +83,25 @@ def test_named_disturbance_must_not_happen(
 ) -> None:
     expected = ExpectedFailure("NAV-1", ("speed", "door"))
     verdicts = [verdict(name, status) for name, status in zip(("speed", "clearance"), statuses, strict=True)]
-    assert judged(expected, *verdicts, happened=happened) == (outcome, text)
+    assert outcome_and_text(expected, *verdicts, happened=happened) == (outcome, text)
 
 
 def test_named_disturbance_may_happen_if_another_of_the_same_name_does_not() -> None:
     missing = verdict("lidar.off", FAIL, DISTURBANCE)
-    named = ExpectedFailure("NAV-1", ("lidar.off",))
-    assert judged(named, missing, happened=("lidar.off",))[0] is Outcome.FAILED_AS_EXPECTED
+    expected = ExpectedFailure("NAV-1", ("lidar.off",))
+    assert outcome_and_text(expected, missing, happened=("lidar.off",))[0] is Outcome.FAILED_AS_EXPECTED
 
 
 def test_a_warning_is_no_failure_to_expect() -> None:
     verdicts = verdict("speed", FAIL, severity="warn"), verdict("clearance", PASS)
-    assert judged(KNOWN, *verdicts) == (Outcome.FAILED, "everything passed")
+    assert outcome_and_text(KNOWN, *verdicts) == (Outcome.FAILED, "everything passed")
 
 
 def test_truncated_log_never_fails_as_expected() -> None:
-    assert judged(KNOWN, verdict("speed", FAIL), verdict("clearance", UNCLEAR), whole=False) == (Outcome.FAILED, "")
+    assert outcome_and_text(KNOWN, verdict("speed", FAIL), verdict("clearance", UNCLEAR), is_complete=False) == (
+        Outcome.FAILED,
+        "",
+    )
 
 
 @pytest.mark.parametrize(
@@ -106,7 +114,7 @@ def test_truncated_log_never_fails_as_expected() -> None:
     ],
 )
 def test_verdict_on_the_expectation_has_a_unique_name(ids: tuple[str, ...], name: str) -> None:
-    verdicts = [verdict(each, FAIL) for each in ids]
-    _, verdict_on_it = apply_expectation(KNOWN, verdicts, Outcome.FAILED, True)
-    assert verdict_on_it is not None
-    assert verdict_on_it.id == name
+    verdicts = [verdict(id_, FAIL) for id_ in ids]
+    _, expectation_verdict = apply_expectation(KNOWN, verdicts, Outcome.FAILED, True)
+    assert expectation_verdict is not None
+    assert expectation_verdict.id == name

@@ -1,3 +1,5 @@
+"""Tests of the texts of verdicts and disturbances, and of margins relative to their limits."""
+
 import math
 from dataclasses import replace
 
@@ -47,12 +49,12 @@ def test_every_status_has_its_sentence(finding, text):
 
 
 def test_tightest_bound_has_the_smallest_relative_margin():
-    far = Finding(Status.PASS, "time_to_goal", "", "≤ 40.00 s", 4.0, "s", 36.0)
-    near = Finding(Status.PASS, "path_length", "", "≤ 10.00 m", 0.14, "m", 9.86)
+    loose = Finding(Status.PASS, "time_to_goal", "", "≤ 40.00 s", 4.0, "s", 36.0)
+    tight = Finding(Status.PASS, "path_length", "", "≤ 10.00 m", 0.14, "m", 9.86)
     count = Finding(Status.PASS, "collisions", "", "≤ 0", 0.0, "", 0.0)
     verdicts = [
-        verdict(far, "time_to_goal", "t"),
-        verdict(near, "path_length", "path_length"),
+        verdict(loose, "time_to_goal", "t"),
+        verdict(tight, "path_length", "path_length"),
         verdict(count, "c", "c"),
     ]
     assert tightest_margin(verdicts) == "path_length +0.14 m, 1 % of its limit"
@@ -133,38 +135,40 @@ def test_a_disturbance_is_reported_in_a_line(ticks, happened, text):
     assert disturbance_line(DisturbanceOutcome(Disturbance("gust", "event"), ticks, happened, "pushed it"), 240) == text
 
 
-def margins(outcome: Outcome, *findings: Finding) -> float:
+def margin_of_run(outcome: Outcome, *findings: Finding) -> float:
     verdicts = tuple(Verdict(finding.what, finding.what, "fail", (finding,)) for finding in findings)
     error = RunFailure("stack-crashed", "gone", by_stack=True) if outcome is Outcome.ERROR else None
     return run_margin(RunResult(RunKey("a", 1), "a", outcome, verdicts, error=error))
 
 
-def measured(status: Status, value: float, limit: float, relation: str = "≥", what: str = "clearance") -> Finding:
+def bounded_finding(
+    status: Status, value: float, limit: float, relation: str = "≥", what: str = "clearance"
+) -> Finding:
     margin = value - limit if relation == "≥" else limit - value
     return Finding(status, what, "", f"{relation} {limit}", margin, "m", value)
 
 
 def test_the_margin_of_a_run_is_that_of_its_tightest_criterion_relative_to_the_limit() -> None:
-    near, far = measured(Status.PASS, 0.6, 0.4), measured(Status.PASS, 1.0, 4.0, "≤", "speed")
-    assert margins(Outcome.PASSED, far, near) == pytest.approx(0.5)
-    assert margins(Outcome.PASSED, far) == pytest.approx(0.75)
-    assert margins(Outcome.PASSED) == 1.0
-    assert margins(Outcome.PASSED, replace(near, margin=None)) == 1.0
-    assert margins(Outcome.PASSED, replace(near, margin=-1e-12)) == 0.0
-    assert margins(Outcome.PASSED, replace(near, margin=math.inf), far) == pytest.approx(0.75)
+    tight, loose = bounded_finding(Status.PASS, 0.6, 0.4), bounded_finding(Status.PASS, 1.0, 4.0, "≤", "speed")
+    assert margin_of_run(Outcome.PASSED, loose, tight) == pytest.approx(0.5)
+    assert margin_of_run(Outcome.PASSED, loose) == pytest.approx(0.75)
+    assert margin_of_run(Outcome.PASSED) == 1.0
+    assert margin_of_run(Outcome.PASSED, replace(tight, margin=None)) == 1.0
+    assert margin_of_run(Outcome.PASSED, replace(tight, margin=-1e-12)) == 0.0
+    assert margin_of_run(Outcome.PASSED, replace(tight, margin=math.inf), loose) == pytest.approx(0.75)
 
 
 def test_the_margin_of_a_failed_run_is_negative_and_at_least_minus_one() -> None:
-    held = measured(Status.PASS, 0.6, 0.5)
-    assert margins(Outcome.FAILED, held, measured(Status.FAIL, 0.3, 0.4)) == pytest.approx(-0.25)
-    two = measured(Status.FAIL, 0.3, 0.4), measured(Status.FAIL, 3.0, 2.0, "≤", "speed")
-    assert margins(Outcome.FAILED, *two) == pytest.approx(-0.5)
-    assert margins(Outcome.FAILED, measured(Status.FAIL, 9.0, 2.0, "≤", "speed")) == -1.0
-    assert margins(Outcome.FAILED, Finding(Status.FAIL, "result", "failed", "reached")) == -1.0
-    assert margins(Outcome.FAILED, replace(two[0], margin=-math.inf)) == -1.0
-    assert margins(Outcome.FAILED, replace(two[0], margin=0.0)) == -1.0
-    assert margins(Outcome.FAILED) == -1.0
-    assert margins(Outcome.ERROR) == -1.0
+    passed = bounded_finding(Status.PASS, 0.6, 0.5)
+    assert margin_of_run(Outcome.FAILED, passed, bounded_finding(Status.FAIL, 0.3, 0.4)) == pytest.approx(-0.25)
+    two = bounded_finding(Status.FAIL, 0.3, 0.4), bounded_finding(Status.FAIL, 3.0, 2.0, "≤", "speed")
+    assert margin_of_run(Outcome.FAILED, *two) == pytest.approx(-0.5)
+    assert margin_of_run(Outcome.FAILED, bounded_finding(Status.FAIL, 9.0, 2.0, "≤", "speed")) == -1.0
+    assert margin_of_run(Outcome.FAILED, Finding(Status.FAIL, "result", "failed", "reached")) == -1.0
+    assert margin_of_run(Outcome.FAILED, replace(two[0], margin=-math.inf)) == -1.0
+    assert margin_of_run(Outcome.FAILED, replace(two[0], margin=0.0)) == -1.0
+    assert margin_of_run(Outcome.FAILED) == -1.0
+    assert margin_of_run(Outcome.ERROR) == -1.0
 
 
 def test_margin_without_a_limit_is_not_scaled() -> None:
@@ -174,16 +178,16 @@ def test_margin_without_a_limit_is_not_scaled() -> None:
 
 
 def test_margin_of_a_failed_run_ignores_infinite_margins() -> None:
-    broken = measured(Status.FAIL, 0.3, 0.4)
-    assert margins(Outcome.FAILED, replace(broken, margin=math.inf), broken) == pytest.approx(-0.25)
-    assert margins(Outcome.FAILED, replace(broken, margin=-math.inf), broken) == pytest.approx(-0.25)
-    assert margins(Outcome.FAILED, replace(broken, margin=0.1, value=0.5), broken) == pytest.approx(-0.25)
+    broken = bounded_finding(Status.FAIL, 0.3, 0.4)
+    assert margin_of_run(Outcome.FAILED, replace(broken, margin=math.inf), broken) == pytest.approx(-0.25)
+    assert margin_of_run(Outcome.FAILED, replace(broken, margin=-math.inf), broken) == pytest.approx(-0.25)
+    assert margin_of_run(Outcome.FAILED, replace(broken, margin=0.1, value=0.5), broken) == pytest.approx(-0.25)
 
 
 def test_margin_in_multiples_of_a_scale_is_a_relative_margin() -> None:
     """A `scale` of the conditions of temporal criteria makes margins of different quantities comparable."""
     scaled = Finding(Status.PASS, "speed", "0.25 m/s", "≤ 0.50 m/s", 0.25)
     count = Finding(Status.PASS, "collisions", "0 collisions", "≤ 0", 0.0, "", 0.0)
-    assert margins(Outcome.PASSED, scaled, count, measured(Status.PASS, 0.6, 0.4)) == pytest.approx(0.25)
+    assert margin_of_run(Outcome.PASSED, scaled, count, bounded_finding(Status.PASS, 0.6, 0.4)) == pytest.approx(0.25)
     failed = Finding(Status.FAIL, "speed", "0.75 m/s", "≤ 0.50 m/s", -0.25)
-    assert margins(Outcome.FAILED, failed) == pytest.approx(-0.25)
+    assert margin_of_run(Outcome.FAILED, failed) == pytest.approx(-0.25)

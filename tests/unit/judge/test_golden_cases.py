@@ -21,30 +21,30 @@ def test_verdict_equals_that_of_the_golden_case(kind, golden):
     assert golden["origin"]
     (verdict,) = judge([entry], synthetic_trace(golden["trace"]), synthetic_case(golden.get("case", {})))
     assert verdict.status is Status(golden["expect"]["status"]), verdict
-    expected = golden["expect"]["findings"]
-    assert len(verdict.findings) == len(expected), verdict.findings
-    for finding, wanted in zip(verdict.findings, expected, strict=True):
-        compare(finding, wanted)
+    expected_findings = golden["expect"]["findings"]
+    assert len(verdict.findings) == len(expected_findings), verdict.findings
+    for finding, expected_finding in zip(verdict.findings, expected_findings, strict=True):
+        assert_finding_equals(finding, expected_finding)
 
 
-def compare(finding: Finding, wanted: dict) -> None:
-    tolerance = wanted.get("tolerance", 1e-6)
-    assert finding.status is Status(wanted["status"]), finding
+def assert_finding_equals(finding: Finding, expected_finding: dict) -> None:
+    tolerance = expected_finding.get("tolerance", 1e-6)
+    assert finding.status is Status(expected_finding["status"]), finding
     for key in ("what", "measured", "limit"):
-        if key in wanted:
-            assert getattr(finding, key) == wanted[key], finding
+        if key in expected_finding:
+            assert getattr(finding, key) == expected_finding[key], finding
     for key in ("value", "margin"):
-        if key in wanted:
-            number = wanted[key]
+        if key in expected_finding:
+            number = expected_finding[key]
             assert getattr(finding, key) == (number if number is None else pytest.approx(number, abs=tolerance)), (
                 finding
             )
-    if "t" in wanted:
-        assert finding.tick / 240 == pytest.approx(wanted["t"], abs=max(tolerance * 3, 1e-6)), finding
-    if "place" in wanted:
-        assert finding.place == pytest.approx(wanted["place"], abs=1e-6), finding
-    if "detail" in wanted:
-        assert list(finding.detail) == wanted["detail"], finding
+    if "t" in expected_finding:
+        assert finding.tick / 240 == pytest.approx(expected_finding["t"], abs=max(tolerance * 3, 1e-6)), finding
+    if "place" in expected_finding:
+        assert finding.place == pytest.approx(expected_finding["place"], abs=1e-6), finding
+    if "detail" in expected_finding:
+        assert list(finding.detail) == expected_finding["detail"], finding
 
 
 @pytest.mark.parametrize("kind", AnyCriterion.choices())

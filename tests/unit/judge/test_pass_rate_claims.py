@@ -55,7 +55,7 @@ def test_a_fixed_claim_is_decided_by_all_runs_only() -> None:
 
 
 def false_decisions(true_rate: float, runs: int, held_from: int, refuted_below: int) -> tuple[float, float]:
-    """Exact probabilities to hold and to refute."""
+    """Return the exact probabilities that a claim is held, and that it is refuted."""
     return float(binom.sf(held_from - 1, runs, true_rate)), float(binom.cdf(refuted_below - 1, runs, true_rate))
 
 
@@ -64,8 +64,8 @@ def test_error_rates_of_a_fixed_claim_are_exactly_bounded() -> None:
     status = [evaluate_claim(fixed, results([True] * k + [False] * (200 - k))).status for k in range(201)]
     held_from = status.index(ClaimStatus.HELD)
     refuted_below = status.index(ClaimStatus.UNDECIDED)
-    assert all(one is ClaimStatus.HELD for one in status[held_from:])
-    assert all(one is ClaimStatus.REFUTED for one in status[:refuted_below])
+    assert all(claim_status is ClaimStatus.HELD for claim_status in status[held_from:])
+    assert all(claim_status is ClaimStatus.REFUTED for claim_status in status[:refuted_below])
     held, _ = false_decisions(0.9 - 1e-9, 200, held_from, refuted_below)
     _, refuted = false_decisions(0.9, 200, held_from, refuted_below)
     assert 0.02 < held <= 0.05
@@ -73,28 +73,28 @@ def test_error_rates_of_a_fixed_claim_are_exactly_bounded() -> None:
 
 
 def simulated_decisions(tested: PassRate, rate: float, seed: int) -> tuple[float, float, float]:
-    """Shares of simulated studies in which a claim is held and refuted, and the mean number of runs."""
+    """Return the shares of simulated studies in which a claim is held and refuted, and the mean number of runs."""
     rng = np.random.default_rng(seed)
     status, runs = [], []
     for _ in range(SIMULATED_STUDIES):
         number, decision = decide(tested, (rng.random(tested.max_runs) < rate).tolist())
         status.append(decision)
         runs.append(number)
-    held, refuted = (status.count(one) / len(status) for one in (ClaimStatus.HELD, ClaimStatus.REFUTED))
+    held, refuted = (status.count(decision) / len(status) for decision in (ClaimStatus.HELD, ClaimStatus.REFUTED))
     return held, refuted, float(np.mean(runs))
 
 
-def allowed(rate: float) -> float:
-    """Largest share in simulations of an event with this probability, at 5 standard deviations."""
+def max_share(rate: float) -> float:
+    """Return the largest share in simulations of an event with this probability, at 5 standard deviations."""
     return rate + 5 * math.sqrt(rate * (1 - rate) / SIMULATED_STUDIES)
 
 
 def test_error_rates_of_sprt_in_simulated_studies() -> None:
     sprt = claim(method="sprt", target=0.97, power=0.9, runs=500)
     held, _, _ = simulated_decisions(sprt, 0.9, seed=1)
-    assert held <= allowed(0.05)
+    assert held <= max_share(0.05)
     held_good, refuted_good, runs = simulated_decisions(sprt, 0.97, seed=2)
-    assert refuted_good <= allowed(0.1)
+    assert refuted_good <= max_share(0.1)
     assert held_good > 0.8
     assert runs < 120  # an exact test with a fixed number of runs and this power needs 158
 
@@ -102,7 +102,7 @@ def test_error_rates_of_sprt_in_simulated_studies() -> None:
 def test_error_rates_of_anytime_in_simulated_studies() -> None:
     anytime = claim(method="anytime", runs=400)
     held, refuted, _ = simulated_decisions(anytime, 0.9, seed=3)
-    assert held + refuted <= allowed(0.05)  # at the limit, either decision is an error
+    assert held + refuted <= max_share(0.05)  # at the limit, either decision is an error
     held, _, runs = simulated_decisions(anytime, 0.99, seed=4)
     assert held > 0.95
     assert runs < 150

@@ -1,3 +1,5 @@
+"""Tests of results of runs and their JSON files, and of runs with invalid signals."""
+
 import json
 import math
 

@@ -46,7 +46,7 @@ def test_verdicts_metrics_and_reasons_contain_the_robot_name() -> None:
         ),
     }
     whole = combine_robots(results, TRACES)
-    assert [one.id for one in whole.verdicts] == ["a/clearance", "b/speed", "b/clearance"]
+    assert [item.id for item in whole.verdicts] == ["a/clearance", "b/speed", "b/clearance"]
     assert whole.lines == (4, 7, 8)
     assert whole.metrics == {"success": 1.0, "a/success": 1.0, "a/collisions": 0.0, "b/success": 1.0}
     assert whole.undefined == {"b/spl": "no way"}
@@ -105,12 +105,12 @@ def test_a_missing_event_of_the_world_is_reported_once_and_a_fault_for_its_robot
         ),
     }
     whole = combine_robots(results, TRACES)
-    assert [one.id for one in whole.verdicts] == ["cart", "a/clearance", "b/lidar.off", "b/clearance"]
+    assert [item.id for item in whole.verdicts] == ["cart", "a/clearance", "b/lidar.off", "b/clearance"]
     assert whole.lines == (3, 9, 5, 9)
-    assert [one.findings[0].measured for one in whole.verdicts] == [
+    assert [item.findings[0].measured for item in whole.verdicts] == [
         "cart never came", "1 m", "b/lidar.off never began", "1 m",
     ]  # fmt: skip
-    assert [one.disturbance.name for one in whole.disturbances] == ["cart", "b/lidar.off"]
+    assert [outcome.disturbance.name for outcome in whole.disturbances] == ["cart", "b/lidar.off"]
 
 
 def test_world_events_count_once_and_robot_events_for_each_robot() -> None:
@@ -159,7 +159,7 @@ def test_failure_is_expected_only_if_all_logs_are_complete() -> None:
     assert whole.outcome is Outcome.FAILED_AS_EXPECTED
     cut = combine_robots({"a": bad, "b": good}, {"a": trace(), "b": broken}, expected)
     assert cut.outcome is Outcome.FAILED
-    assert [one.criterion for one in cut.verdicts] == ["clearance", "clearance"]
+    assert [item.criterion for item in cut.verdicts] == ["clearance", "clearance"]
     assert cut.lines == (4, 5)
 
 

@@ -26,7 +26,7 @@ def run(seed: int, passed: bool = True, margins: Mapping[str, Sequence[float | N
     return RunResult(RunKey("s", seed), "s.yaml", Outcome.PASSED if passed else Outcome.FAILED, verdicts)
 
 
-def broken(seed: int, by_stack: bool) -> RunResult:
+def run_with_error(seed: int, by_stack: bool) -> RunResult:
     return error_result(RunKey("s", seed), "s.yaml", RunFailure("crashed", "exited 1", by_stack=by_stack))
 
 
@@ -42,7 +42,9 @@ def study_of(path: str, values: Sequence[Any], margins: Sequence[float], **field
 
 
 def test_a_crash_of_the_stack_counts_as_a_failure_and_any_other_error_does_not_count() -> None:
-    study = evaluate_study(plan_of([]), [run(1), run(2, False), run(3), broken(4, True), broken(5, False)])
+    study = evaluate_study(
+        plan_of([]), [run(1), run(2, False), run(3), run_with_error(4, True), run_with_error(5, False)]
+    )
     assert (study.scenario, study.passed, study.failed, study.errors) == ("s", 2, 2, 1)
 
 
@@ -71,7 +73,7 @@ def test_runs_without_random_sampling_have_no_limits() -> None:
     study = evaluate_study(plan_of([{"x": 1}], is_random=False), [run(1)])
     assert study.limits is None
     assert study.rates == (RateRow("x", "1", 1, 1, None),)
-    assert evaluate_study(plan_of([]), [broken(1, False)]).limits is None
+    assert evaluate_study(plan_of([]), [run_with_error(1, False)]).limits is None
 
 
 def test_claim_is_evaluated_in_the_order_of_the_seeds() -> None:
@@ -203,14 +205,14 @@ def test_effects_are_corrected_for_their_number_and_the_strongest_is_first() -> 
         for path in "abc"
         for k, criterion in enumerate(("clearance", "speed"))
     }
-    found = [(one.path, one.criterion) for one in study.effects]
+    found = [(effect.path, effect.criterion) for effect in study.effects]
     assert sorted(found) == sorted(p)
     assert found[:2] == [("a", "speed"), ("a", "clearance")]
     largest = 0.0
     for rank, name in enumerate(sorted(p, key=p.__getitem__)):  # Holm, step by step
         largest = max(largest, min(1.0, (6 - rank) * p[name]))
         assert study.effects[found.index(name)].p == pytest.approx(largest, rel=1e-9)
-    strength = [(one.p, -abs(one.effect)) for one in study.effects]
+    strength = [(effect.p, -abs(effect.effect)) for effect in study.effects]
     assert strength == sorted(strength)
 
 
@@ -255,7 +257,7 @@ def test_coverage_is_the_share_of_pairs_of_values_that_occurred() -> None:
     pairs = 2 * 2 + 2 * 3 + 2 * 3
     assert evaluate_study(plan, all_runs).coverage == (4 + 4 + 4) / pairs
     assert evaluate_study(plan, all_runs[:2]).coverage == (2 + 2 + 2) / pairs
-    assert evaluate_study(plan, [*all_runs[:2], broken(3, False)]).coverage == 6 / pairs
+    assert evaluate_study(plan, [*all_runs[:2], run_with_error(3, False)]).coverage == 6 / pairs
     assert evaluate_study(plan_of(values), all_runs).coverage is None
     two = plan_of([{"a": 1, "b": 1}, {"a": 2, "b": 2}], is_designed_in_pairs=True)
     assert evaluate_study(two, [run(1), run(2)]).coverage == 0.5
@@ -275,7 +277,7 @@ def test_study_is_converted_to_plain_data() -> None:
     claim = PassRate(min=0.5, confidence=0.9, method="sprt", target=0.8, runs=30)
     runs = [run(seed, seed != 3, {"clearance": [0.1 * seed]}) for seed in range(1, 9)]
     values = [{"gap": float(seed), "floor": "oak" if seed < 5 else "ash"} for seed in range(1, 9)]
-    study = evaluate_study(plan_of(values, claim=claim, drawn=10), [*runs, broken(9, False)])
+    study = evaluate_study(plan_of(values, claim=claim, drawn=10), [*runs, run_with_error(9, False)])
     data = study_data(study)
     assert study.claim is not None
     assert study.limits is not None

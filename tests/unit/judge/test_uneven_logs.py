@@ -16,17 +16,17 @@ from simscen.judge.evaluation import judge
 from simscen.judge.run_result import judge_run
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
 
-FOREIGN = LogCoverage(recorded_by_simscen=False)
-RATE = 240
+EXTERNAL_LOG = LogCoverage(recorded_by_simscen=False)
+TICK_RATE_HZ = 240
 
 
 def drive(times, speeds, clearance=0.5):
     """Return a run along x, sampled at these times (s) with these speeds."""
-    ticks = np.round(np.array(times) * RATE).astype(np.int64)
+    ticks = np.round(np.array(times) * TICK_RATE_HZ).astype(np.int64)
     speeds = np.array(speeds, dtype=np.float64)
     trace = synthetic_trace({"seconds": float(times[-1]), "truth": [[0, 0, 0]]})
     still = np.zeros(len(ticks))
-    x = np.concatenate(([0.0], np.cumsum(speeds[:-1] * np.diff(ticks) / RATE)))
+    x = np.concatenate(([0.0], np.cumsum(speeds[:-1] * np.diff(ticks) / TICK_RATE_HZ)))
     return replace(
         trace,
         truth=Samples(ticks, np.column_stack((x, still, still))),
@@ -36,12 +36,12 @@ def drive(times, speeds, clearance=0.5):
     )
 
 
-def result(trace, *criteria, coverage=FOREIGN):
+def result(trace, *criteria, coverage=EXTERNAL_LOG):
     entries = [AnyCriterion.model_validate(words) for words in criteria]
     return judge_run(RunKey("a", 7), "a", entries, trace, synthetic_case({}), coverage=coverage)
 
 
-def oscillating(times):
+def oscillating_speeds(times):
     """Return speeds that rise and fall in 4 s and oscillate at 1 Hz."""
     t = np.array(times)
     return 0.5 * np.sin(np.pi * t / 4) * (1 + 0.2 * np.sin(2 * np.pi * t))
@@ -61,19 +61,19 @@ EVEN = np.arange(0, 4.0001, 1 / 40)
     ids=["a late second sample", "lost samples", "jitter", "30 Hz"],
 )
 def test_smoothness_does_not_depend_on_the_spacing_of_samples(times):
-    even, uneven = (result(drive(each, oscillating(each)), {"collisions": {}}).metrics for each in (EVEN, times))
+    even, uneven = (result(drive(each, oscillating_speeds(each)), {"collisions": {}}).metrics for each in (EVEN, times))
     assert uneven["sparc"] == pytest.approx(even["sparc"], abs=0.03)
     assert uneven["mean_jerk"] == pytest.approx(even["mean_jerk"], rel=0.5)
     bound = {"smoothness": {"min_sparc": even["sparc"] + 0.1}}
-    assert result(drive(times, oscillating(times)), bound).verdicts[0].status is Status.FAIL
+    assert result(drive(times, oscillating_speeds(times)), bound).verdicts[0].status is Status.FAIL
 
 
 def test_initial_gap_of_a_quarter_second_does_not_hide_oscillation():
     times = np.concatenate(([0.0], EVEN[11:]))
-    rough = drive(times, oscillating(times))
+    rough = drive(times, oscillating_speeds(times))
     found = result(rough, {"smoothness": {"min_sparc": -2}})
     assert found.verdicts[0].status is not Status.PASS
-    assert sparc(oscillating(times), 1 / 0.275) > -2, "the value at the rate of the first gap"
+    assert sparc(oscillating_speeds(times), 1 / 0.275) > -2, "the value at the rate of the first gap"
 
 
 @pytest.mark.parametrize("count", [1, 2, 3])
@@ -84,7 +84,7 @@ def test_smoothness_of_a_few_samples_is_never_an_error(count):
 
 def test_smoothness_is_inconclusive_with_sparse_samples():
     times = np.arange(0, 4.0001, 0.1)
-    found = result(drive(times, oscillating(times)), {"smoothness": {"min_sparc": -9}})
+    found = result(drive(times, oscillating_speeds(times)), {"smoothness": {"min_sparc": -9}})
     (finding,) = found.verdicts[0].findings
     assert finding.status is Status.INCONCLUSIVE
     assert finding.measured == "the truth has 10.0 samples a second, too few for changes up to 10 Hz"
@@ -101,7 +101,7 @@ def test_criteria_judge_uneven_samples(name):
         "whenever": {"whenever": slow, "then": {"eventually": {"signal": "speed", "op": "<=", "value": 0.7}}},
     }[name]
     times = np.delete(np.arange(0, 4.0001, 1 / 30), [7, 50])
-    found = result(drive(times, oscillating(times)), written)
+    found = result(drive(times, oscillating_speeds(times)), written)
     assert found.outcome is Outcome.PASSED, found
 
 
@@ -117,14 +117,14 @@ def test_time_windows_do_not_depend_on_sample_counts():
 
 def test_unused_undefined_metric_is_no_error():
     times = np.delete(EVEN, range(20, 50))
-    found = result(drive(times, oscillating(times)), {"speed": {"max": 1.0}})
+    found = result(drive(times, oscillating_speeds(times)), {"speed": {"max": 1.0}})
     assert found.outcome is Outcome.PASSED
     assert found.undefined["mean_jerk"].startswith("the truth has no sample from t = 0.47 s to 1.25 s")
     assert found.metrics["max_speed"] is not None
 
 
 def test_non_finite_belief_in_a_third_party_log_affects_only_its_criteria():
-    trace = drive(EVEN, oscillating(EVEN))
+    trace = drive(EVEN, oscillating_speeds(EVEN))
     belief = np.full((1, 9), np.nan)
     trace = replace(trace, belief=Samples(np.array([5]), belief))
     assert result(trace, {"speed": {"max": 1.0}}).outcome is Outcome.PASSED
@@ -140,10 +140,10 @@ CUTS = {
 
 
 @pytest.mark.parametrize("cut", CUTS)
-@pytest.mark.parametrize("coverage", [COMPLETE_COVERAGE, FOREIGN], ids=["own", "foreign"])
+@pytest.mark.parametrize("coverage", [COMPLETE_COVERAGE, EXTERNAL_LOG], ids=["own", "foreign"])
 @pytest.mark.parametrize("signal", ["truth", "clearance"])
 def test_partial_coverage_does_not_pass(cut, coverage, signal):
-    trace = drive(EVEN, oscillating(EVEN))
+    trace = drive(EVEN, oscillating_speeds(EVEN))
     kept = CUTS[cut](EVEN)
     names = ("truth", "velocity") if signal == "truth" else ("clearance",)
     parts = {name: Samples(getattr(trace, name).ticks[kept], getattr(trace, name).values[kept]) for name in names}

@@ -1,3 +1,5 @@
+"""Test that all error codes are documented."""
+
 import re
 from pathlib import Path
 
@@ -8,8 +10,8 @@ SOURCE = Path(simscen.__file__).parent
 
 
 def test_every_code_in_the_source_is_explained() -> None:
-    used = {code for file in SOURCE.rglob("*.py") if file.name != "codes.py" for code in _codes(file)}
-    assert used - set(CODES) == set()
+    codes = {code for file in SOURCE.rglob("*.py") if file.name != "codes.py" for code in _codes(file)}
+    assert codes - set(CODES) == set()
 
 
 def _codes(file: Path) -> list[str]:

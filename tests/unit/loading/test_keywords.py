@@ -1,3 +1,5 @@
+"""Tests of the selection of scenarios with `-k` and `--tag`."""
+
 from dataclasses import dataclass
 
 import pytest
@@ -18,11 +20,15 @@ def _scenario(id_: str, *tags: str) -> _Scenario:
     return _Scenario(id_, ScenarioSpec.model_validate(data))
 
 
-ALL = [_scenario("faults/lidar_off", "fault", "lidar"), _scenario("faults/slip", "fault"), _scenario("Navigation/goal")]
+SCENARIOS = [
+    _scenario("faults/lidar_off", "fault", "lidar"),
+    _scenario("faults/slip", "fault"),
+    _scenario("Navigation/goal"),
+]
 
 
 def _ids(keyword: str = "", *tags: str) -> list[str]:
-    return [scenario.title for scenario in select(ALL, keyword, tags)]
+    return [scenario.title for scenario in select(SCENARIOS, keyword, tags)]
 
 
 @pytest.mark.parametrize(
@@ -34,7 +40,7 @@ def _ids(keyword: str = "", *tags: str) -> list[str]:
     ],
 )  # fmt: skip
 def test_keywords_read_as_in_pytest(keyword: str, expected: str) -> None:
-    assert _ids(keyword) == [ALL["abc".index(letter)].title for letter in expected]
+    assert _ids(keyword) == [SCENARIOS["abc".index(letter)].title for letter in expected]
 
 
 def test_any_of_the_tags_selects() -> None:
@@ -65,4 +71,4 @@ def test_keyword_expression_executes_no_code() -> None:
 )
 def test_empty_selection_is_explained(keyword: str, tags: tuple[str, ...], message: str) -> None:
     with pytest.raises(NothingSelected, match=message):
-        select(ALL, keyword, tags)
+        select(SCENARIOS, keyword, tags)

@@ -1,4 +1,4 @@
-"""Reduced scenarios: trees without parts, rounded numbers, and their text."""
+"""Tests of reduced scenarios: removed parts, rounded numbers, and the written text."""
 
 from typing import Any
 
@@ -54,34 +54,34 @@ def test_parts_of_any_depth_are_removable_except_the_cause_of_failure() -> None:
 
 def test_removing_parts_also_removes_empty_parents() -> None:
     tree = parsed(TEXT)
-    left = without_parts(tree, [("goals", 0), ("events", 0), ("robot", "motor_torque")])
-    assert left.plain["goals"] == [{"pose": "kitchen", "timeout": "100 s"}]
-    assert "events" not in left.plain
-    assert left.plain["robot"] == {"pose": "dock"}
-    assert removed_parts(tree, left) == ["robot.motor_torque", "goals[0] (sofa)", "events"]
+    reduced = without_parts(tree, [("goals", 0), ("events", 0), ("robot", "motor_torque")])
+    assert reduced.plain["goals"] == [{"pose": "kitchen", "timeout": "100 s"}]
+    assert "events" not in reduced.plain
+    assert reduced.plain["robot"] == {"pose": "dock"}
+    assert removed_parts(tree, reduced) == ["robot.motor_torque", "goals[0] (sofa)", "events"]
 
 
-def test_values_are_changed_at_their_places() -> None:
+def test_values_are_changed_at_their_keys() -> None:
     tree = parsed(TEXT)
-    place = Position("a.yaml", 1, 1)
-    changed = with_values(tree, {("goals", 1, "timeout"): ScalarNode(place, "5 s"), ("robot", "motor_torque"): None})
+    position = Position("a.yaml", 1, 1)
+    changed = with_values(tree, {("goals", 1, "timeout"): ScalarNode(position, "5 s"), ("robot", "motor_torque"): None})
     assert changed.plain["goals"][1] == {"pose": "kitchen", "timeout": "5 s"}
     assert changed.plain["robot"] == {"pose": "dock"}
-    assert with_values(tree, {("stack", "type"): ScalarNode(place, "x")}).plain["stack"] == {"type": "x"}
+    assert with_values(tree, {("stack", "type"): ScalarNode(position, "x")}).plain["stack"] == {"type": "x"}
     assert with_seed(tree, 7).plain["seed"] == 7
 
 
 @pytest.mark.parametrize(("digits", "values"), [(1, {"90 %", "60 s"}), (2, {"93 %", "62 s"}), (3, {"93.1 %"})])
 def test_numbers_are_rounded_with_their_units(digits: int, values: set[str]) -> None:
     tree = parsed(TEXT)
-    found = find_roundings(tree, digits)
-    assert {one.value for one in found} == values
-    rounded = with_roundings(tree, found)
+    roundings = find_roundings(tree, digits)
+    assert {rounding.value for rounding in roundings} == values
+    rounded = with_roundings(tree, roundings)
     assert len(changed_values(tree, rounded)) == len(values)
     assert not removed_parts(tree, rounded)
 
 
-def written(content: dict[str, Any]) -> str:
+def text_with_content(content: dict[str, Any]) -> str:
     text = changed_text(TEXT, "a.yaml", content)
     assert parsed(text).plain == content
     return text
@@ -89,15 +89,19 @@ def written(content: dict[str, Any]) -> str:
 
 def test_unchanged_parts_keep_their_text() -> None:
     content = parsed(TEXT).plain
-    assert written(content) == TEXT.replace("\n\n", "\n")
+    assert text_with_content(content) == TEXT.replace("\n\n", "\n")
     without_second = {**content, "goals": content["goals"][:1]}
-    assert "  # the first\n  - {pose: sofa, timeout: 61.7 s}\n# disturbances\n" in written(without_second)
+    assert "  # the first\n  - {pose: sofa, timeout: 61.7 s}\n# disturbances\n" in text_with_content(without_second)
     without_first = {**content, "goals": content["goals"][1:]}
-    assert "goals:\n  - pose: kitchen  # the second\n    timeout: 100 s\n# disturbances\n" in written(without_first)
+    assert "goals:\n  - pose: kitchen  # the second\n    timeout: 100 s\n# disturbances\n" in text_with_content(
+        without_first
+    )
     changed = {**content, "robot": {"pose": "sofa"}, "seed": 3}
-    assert "robot: {pose: sofa}\n" in written(changed)
-    assert written(changed).endswith("pass:\n  - collisions: {max: 0}\nseed: 3\n")
-    assert written({key: value for key, value in content.items() if key != "events"}).count("disturbances") == 0
+    assert "robot: {pose: sofa}\n" in text_with_content(changed)
+    assert text_with_content(changed).endswith("pass:\n  - collisions: {max: 0}\nseed: 3\n")
+    assert (
+        text_with_content({key: value for key, value in content.items() if key != "events"}).count("disturbances") == 0
+    )
 
 
 @pytest.mark.parametrize(
@@ -118,4 +122,4 @@ def test_any_layout_is_written_with_the_right_content(text: str) -> None:
 def test_names_that_begin_with_a_number_are_not_rounded() -> None:
     tree, _ = parse_yaml("{events: [{name: 2024-11 pallet}], robot: {payload: {mass: 12345 g}}}", "a")
     assert isinstance(tree, MappingNode)
-    assert [one.value for one in find_roundings(tree, 3)] == ["12300 g"]
+    assert [rounding.value for rounding in find_roundings(tree, 3)] == ["12300 g"]

@@ -1,3 +1,5 @@
+"""Tests of loading scenarios with their worlds, robots, maps, and plug-ins."""
+
 from collections.abc import Callable
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""Parameters of a stack: given values, profile values, and defaults."""
+"""Tests of stack parameters: given values, values of a profile, and defaults."""
 
 import pytest
 
@@ -7,7 +7,7 @@ from simscen.model.profiles import NAV2, apply_profile, merge_parameters
 from simscen.model.stack import ADVANCED_BUILDER, REFERENCE_BUILDER, StackSpec
 
 NAV2_PARAMS = {
-    # nav2_bringup/params/nav2_params.yaml, August 2026, by our names
+    # nav2_bringup/params/nav2_params.yaml, August 2026, with the names of simscen
     "localizer.laser_model_type": "likelihood_field", "localizer.max_beams": 60, "localizer.max_particles": 2000,
     "localizer.alpha1": 0.2, "localizer.z_hit": 0.5, "localizer.sigma_hit": 0.2, "localizer.update_min_a": 0.2,
     "controller_frequency": 20.0, "failure_tolerance": 0.3,
@@ -37,7 +37,7 @@ NAV2_PARAMS = {
 }  # fmt: skip
 
 
-def at(spec: object, path: str) -> object:
+def parameter(spec: object, path: str) -> object:
     for name in path.split("."):
         spec = getattr(spec, name)
     return spec
@@ -45,7 +45,7 @@ def at(spec: object, path: str) -> object:
 
 @pytest.mark.parametrize("path", NAV2_PARAMS)
 def test_nav2_profile_has_the_values_of_nav2(path: str) -> None:
-    assert at(StackSpec(profile="nav2"), path) == NAV2_PARAMS[path]
+    assert parameter(StackSpec(profile="nav2"), path) == NAV2_PARAMS[path]
 
 
 def test_given_parameters_override_the_profile_and_the_profile_overrides_defaults() -> None:
@@ -88,8 +88,12 @@ def test_advanced_profile_selects_the_advanced_components() -> None:
         True,
     )
     assert "retrace" in spec.recovery.names and spec.prediction.enabled
-    own = StackSpec(profile="advanced", planner={"type": "navfn"}, localizer={"type": "amcl"})
-    assert (own.planner.type, own.planner.cautious, own.localizer.type) == ("navfn", True, "amcl")
+    spec_with_types = StackSpec(profile="advanced", planner={"type": "navfn"}, localizer={"type": "amcl"})
+    assert (spec_with_types.planner.type, spec_with_types.planner.cautious, spec_with_types.localizer.type) == (
+        "navfn",
+        True,
+        "amcl",
+    )
 
 
 def test_nested_mappings_are_merged() -> None:
@@ -102,4 +106,4 @@ def test_nested_mappings_are_merged() -> None:
 def test_every_value_of_a_profile_is_valid() -> None:
     for section in ("localizer", "planner", "controller", "goal_checker"):
         for kind in NAV2[section]:
-            assert at(StackSpec(profile="nav2", **{section: {"type": kind}}), f"{section}.type") == kind
+            assert parameter(StackSpec(profile="nav2", **{section: {"type": kind}}), f"{section}.type") == kind

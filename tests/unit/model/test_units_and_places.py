@@ -1,4 +1,4 @@
-"""Units and names of places are valid for all numbers and poses of all files."""
+"""Tests that numbers and poses in all files accept units and names of places."""
 
 import math
 import sys
@@ -21,7 +21,7 @@ from simscen.model.sensors import InertialUnit
 from simscen.spec.places import PlaceAllowed, PoseSpec, Ring
 from simscen.spec.quantities import AnyQuantity, Quantity
 
-PLAIN = {
+NUMBERS_WITHOUT_UNITS = {
     "SpeedMask.base": "percent or m/s, as `type` says: CostmapFilterInfo has one number for both",
     "SpeedMask.multiplier": "percent or m/s for each unit of a cell's value, as `type` says",
     "Amcl.alpha1": "variances of unlike things for each other (Thrun et al., table 5.6), 0.2 in every file of Nav2",
@@ -81,9 +81,9 @@ PLAIN = {
     "Smoothness.min_ldlj": "a logarithm of dimensionless jerk",
     "RobotSpec.arguments": "whatever the xacro file makes of it",
 }
-"""Numbers that are bare for a reason."""
+"""Numbers that accept no unit, and why."""
 
-NO_PLACES = {
+POSES_WITHOUT_PLACES = {
     "WorldSpec.places": "they are what the names stand for",
     "WorldSpec.regions": "an area is drawn, corner by corner",
     "Part.pose": "in the robot's frame",
@@ -91,7 +91,7 @@ NO_PLACES = {
     "Outdated.missing": "an area is drawn, corner by corner",
     "Outdated.extra": "likewise",
     "Spawn.ahead": "in the robot's frame",
-    **{f"{shape}.polygon": "in the thing's own frame" for shape in ("Obstacle", "Movable", "Part", "Spawn")},
+    **{f"{shape}.polygon": "in the frame of the object" for shape in ("Obstacle", "Movable", "Part", "Spawn")},
     **{f"{shape}.cylinder": "radius and height" for shape in ("Obstacle", "Movable", "Part", "Spawn")},
 }
 """Poses and pairs of lengths that are no places of the world, and why."""
@@ -116,11 +116,11 @@ def is_pose(kind: Any) -> bool:
 
 
 def test_every_number_with_a_dimension_accepts_a_unit() -> None:
-    assert {str(value) for value in _bare_numbers()} == set(PLAIN)
+    assert {str(value) for value in _bare_numbers()} == set(NUMBERS_WITHOUT_UNITS)
 
 
 @pytest.mark.parametrize(
-    ("model", "key", "written", "meant"),
+    ("model", "key", "text", "value"),
     [
         (ScenarioSpec, "linger", "2 s", 2.0),
         (Physics, "tick_rate", "0.24 kHz", 240),
@@ -130,11 +130,11 @@ def test_every_number_with_a_dimension_accepts_a_unit() -> None:
         (SkidSteer, "turning_scale", "150 %", 1.5),
     ],
 )
-def test_numbers_accept_units(model: type[BaseModel], key: str, written: str, meant: float) -> None:
-    taken = TypeAdapter(Annotated[(model.model_fields[key].annotation, *model.model_fields[key].metadata)])
-    assert taken.validate_python(written, strict=True) == pytest.approx(meant)
+def test_numbers_accept_units(model: type[BaseModel], key: str, text: str, value: float) -> None:
+    adapter = TypeAdapter(Annotated[(model.model_fields[key].annotation, *model.model_fields[key].metadata)])
+    assert adapter.validate_python(text, strict=True) == pytest.approx(value)
     with pytest.raises(ValidationError):
-        taken.validate_python("2 kg", strict=True)
+        adapter.validate_python("2 kg", strict=True)
 
 
 def test_integer_with_a_unit_stays_an_integer() -> None:
@@ -145,7 +145,7 @@ def test_integer_with_a_unit_stays_an_integer() -> None:
 def test_names_of_places_are_valid_for_all_poses_and_points_of_the_world() -> None:
     found = list(_poses_and_points())
     without = {str(value) for value in found if not any(isinstance(mark, PlaceAllowed) for mark in value.marks)}
-    assert without == set(NO_PLACES)
+    assert without == set(POSES_WITHOUT_PLACES)
     assert len(found) > len(without)
 
 

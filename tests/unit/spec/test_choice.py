@@ -1,4 +1,4 @@
-"""Choices that installed packages extend."""
+"""Tests of choices that installed packages extend."""
 
 import pickle
 from copy import deepcopy
@@ -27,7 +27,7 @@ def test_name_is_unknown_without_its_package() -> None:
 
 
 @pytest.mark.parametrize(
-    ("words", "loc", "kind"),
+    ("keys", "loc", "kind"),
     [
         ({"calm": {"max": -1}}, ("calm", "max"), "greater_than"),
         ({"calm": {"min": 1}}, ("calm", "min"), "extra_forbidden"),
@@ -35,9 +35,9 @@ def test_name_is_unknown_without_its_package() -> None:
         ({"calm": {}, "clam": {}}, ("clam",), "extra_forbidden"),
     ],
 )
-def test_error_in_an_installed_choice_has_its_location(calm, words, loc, kind) -> None:
+def test_error_in_an_installed_choice_has_its_location(calm, keys, loc, kind) -> None:
     with pytest.raises(ValidationError) as output:
-        AnyCriterion.model_validate(words)
+        AnyCriterion.model_validate(keys)
     assert [(error["loc"], error["type"]) for error in output.value.errors()] == [(loc, kind)]
 
 
@@ -54,28 +54,28 @@ def test_broken_package_is_reported_at_the_key_that_uses_it(packages) -> None:
 
 def test_installed_choice_can_be_copied_and_pickled(calm) -> None:
     entry = AnyCriterion.model_validate({"calm": {"max": 2.0}})
-    for again in (pickle.loads(pickle.dumps(entry)), deepcopy(entry), entry.model_copy()):
-        assert again == entry
-        assert again.chosen.max == 2.0
+    for copy in (pickle.loads(pickle.dumps(entry)), deepcopy(entry), entry.model_copy()):
+        assert copy == entry
+        assert copy.chosen.max == 2.0
 
 
 @pytest.mark.parametrize(
-    ("kind", "choice", "before"),
+    ("kind", "choice", "bases"),
     [("criterion", AnyCriterion, "Calm(Spec, Criterion)"), ("planner", StackSpec, "Calm(PlannerSpec)")],
 )
-def test_exception_in_a_validator_of_a_package_is_reported_at_its_key(packages, kind, choice, before) -> None:
+def test_exception_in_a_validator_of_a_package_is_reported_at_its_key(packages, kind, choice, bases) -> None:
     text = (
         "from typing import ClassVar, Literal\nfrom pydantic import model_validator\n"
         "from simscen.criteria.base import Criterion\nfrom simscen.model.planners import PlannerSpec\n"
         "from simscen.spec.base import Spec\n\n\n"
-        f"class {before}:\n    component: ClassVar[str] = 'calm:Device'\n    type: Literal['calm'] = 'calm'\n\n"
+        f"class {bases}:\n    component: ClassVar[str] = 'calm:Device'\n    type: Literal['calm'] = 'calm'\n\n"
         "    @model_validator(mode='after')\n    def _checked(self):\n        return {}['nothing']\n\n"
         "    def judge(self, trace, case):\n        return []\n"
     )
     packages("calm", "1.0", {kind: {"calm": "calm:Calm"}}, calm=text)
-    words = {"calm": {}} if kind == "criterion" else {"planner": {"type": "calm"}}
+    keys = {"calm": {}} if kind == "criterion" else {"planner": {"type": "calm"}}
     with pytest.raises(ValidationError) as output:
-        choice.model_validate(words, by_alias=True, by_name=False)
+        choice.model_validate(keys, by_alias=True, by_name=False)
     (error,) = output.value.errors()
     assert error["loc"] == (("calm",) if kind == "criterion" else ("planner",))
     assert "its validation raises KeyError: 'nothing'" in error["msg"]

@@ -1,3 +1,5 @@
+"""Tests of fields whose specifications are imported on first use."""
+
 import subprocess
 import sys
 from typing import Annotated
@@ -10,7 +12,7 @@ from simscen.criteria.registry import AnyCriterion
 from simscen.faults.base import AnyFault
 from simscen.model.world import Wall
 from simscen.spec.base import LazySpec, Spec, annotation_of
-from simscen.triggers.base import AnyCondition as AnyTest
+from simscen.triggers.base import AnyCondition
 
 
 class Site(Spec):
@@ -47,7 +49,7 @@ def test_json_schema_equals_that_of_an_eager_field():
     assert lazy["$defs"] == eager["$defs"]
 
 
-@pytest.mark.parametrize("choice", [AnyCriterion, AnyAction, AnyFault, AnyTest])
+@pytest.mark.parametrize("choice", [AnyCriterion, AnyAction, AnyFault, AnyCondition])
 def test_every_lazy_choice_exists_with_the_promised_type(choice):
     fields = [field for field in choice.model_fields.values() if any(isinstance(m, LazySpec) for m in field.metadata)]
     assert len(fields) >= 6
@@ -59,8 +61,8 @@ def test_unused_choices_are_not_imported():
     code = (
         "import sys, simscen.model.scenario; print(*sorted(m for m in sys.modules if m.startswith('simscen.criteria')))"
     )
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert done.stdout.split() == [
+    process = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert process.stdout.split() == [
         "simscen.criteria",
         "simscen.criteria.base",
         "simscen.criteria.registry",

@@ -1,3 +1,5 @@
+"""Tests of built-in types and of types of installed packages."""
+
 import subprocess
 import sys
 

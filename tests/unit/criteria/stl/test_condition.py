@@ -12,14 +12,14 @@ LOST = {"not": {"signal": "localized"}}
 FAST = {"signal": "speed", "op": ">", "value": 1.0}
 
 
-def refused(words):
+def validation_errors(keys):
     with pytest.raises(ValidationError) as error:
-        Condition.model_validate(words)
+        Condition.model_validate(keys)
     return "; ".join(problem["msg"].removeprefix("Value error, ") for problem in error.value.errors())
 
 
 @pytest.mark.parametrize(
-    ("words", "why"),
+    ("keys", "message"),
     [
         ({}, "expected one of: signal, all, any, not, always, eventually, until, whenever"),
         ({**NEAR, "not": LOST}, "only one of signal, not may be given here"),
@@ -61,12 +61,12 @@ def refused(words):
         ),
     ],
 )
-def test_invalid_condition_is_refused(words, why):
-    assert refused(words).startswith(why)
+def test_invalid_condition_is_refused(keys, message):
+    assert validation_errors(keys).startswith(message)
 
 
 @pytest.mark.parametrize(
-    ("signal", "op", "value", "why"),
+    ("signal", "op", "value", "message"),
     [
         ("speed", ">=", 0, "never below 0 m/s, so `>= 0 m/s` is always true"),
         ("speed", ">", -1, "never below 0 m/s, so `> -1 m/s` is always true"),
@@ -79,8 +79,8 @@ def test_invalid_condition_is_refused(words, why):
         ("collision_count", ">=", 0, "never below 0, so `>= 0` is always true"),
     ],
 )
-def test_trivial_condition_is_refused(signal, op, value, why):
-    assert refused({"signal": signal, "op": op, "value": value}) == f"`{signal}` is {why}"
+def test_trivial_condition_is_refused(signal, op, value, message):
+    assert validation_errors({"signal": signal, "op": op, "value": value}) == f"`{signal}` is {message}"
 
 
 @pytest.mark.parametrize(
@@ -105,10 +105,10 @@ def test_bound_has_the_dimension_of_its_signal():
 
 
 def test_misspelled_signal_is_a_single_problem():
-    assert refused({"signal": "sped", "op": ">", "value": "1 m/s"}).count(";") == 0
-    assert refused({"signal": "sped", "op": ">", "value": "1 N s"}).count(";") == 0
-    assert refused({"signal": "sped", "op": ">", "value": 1}).count(";") == 0
-    assert "valid number" in refused({"signal": "sped", "op": ">", "value": "fast"})
+    assert validation_errors({"signal": "sped", "op": ">", "value": "1 m/s"}).count(";") == 0
+    assert validation_errors({"signal": "sped", "op": ">", "value": "1 N s"}).count(";") == 0
+    assert validation_errors({"signal": "sped", "op": ">", "value": 1}).count(";") == 0
+    assert "valid number" in validation_errors({"signal": "sped", "op": ">", "value": "fast"})
 
 
 def test_comparisons_of_a_condition_are_in_written_order():
@@ -116,10 +116,14 @@ def test_comparisons_of_a_condition_are_in_written_order():
     text = Condition.model_validate(
         {"any": [{"all": [NEAR, LOST]}, {"until": {"hold": hurt, "release": NEAR}}, {"whenever": LOST, "then": hurt}]}
     )
-    names = [one.signal for one in text.comparisons()]
+    names = [comparison.signal for comparison in text.comparisons()]
     assert names == ["clearance", "localized", "in_collision", "clearance", "localized", "in_collision"]
-    assert [one.signal for one in Condition.model_validate({"always": NEAR}).comparisons()] == ["clearance"]
-    assert [one.signal for one in Condition.model_validate({"eventually": NEAR}).comparisons()] == ["clearance"]
+    assert [comparison.signal for comparison in Condition.model_validate({"always": NEAR}).comparisons()] == [
+        "clearance"
+    ]
+    assert [comparison.signal for comparison in Condition.model_validate({"eventually": NEAR}).comparisons()] == [
+        "clearance"
+    ]
 
 
 def test_signal_arguments_use_the_keys_of_the_language():
@@ -129,7 +133,7 @@ def test_signal_arguments_use_the_keys_of_the_language():
 
 
 @pytest.mark.parametrize(
-    ("words", "stretch"),
+    ("keys", "stretch"),
     [
         ({}, (0.0, None)),
         ({"within": 2}, (0.0, 2.0)),
@@ -138,12 +142,12 @@ def test_signal_arguments_use_the_keys_of_the_language():
         ({"between": [1, 2]}, (1.0, 2.0)),
     ],
 )
-def test_window_must_be_a_future_interval(words, stretch):
-    assert Window.model_validate(words).interval == stretch
+def test_window_must_be_a_future_interval(keys, stretch):
+    assert Window.model_validate(keys).interval == stretch
 
 
 @pytest.mark.parametrize(
-    ("words", "why"),
+    ("keys", "message"),
     [
         ({"within": 2, "after": 1}, "only one of within, after may be given here"),
         ({"after": 1, "between": [2, 3]}, "only one of after, between may be given here"),
@@ -154,6 +158,6 @@ def test_window_must_be_a_future_interval(words, stretch):
         ({"within": 0}, "greater than 0"),
     ],
 )
-def test_window_must_be_one_nonempty_interval(words, why):
-    with pytest.raises(ValidationError, match=why):
-        Window.model_validate(words)
+def test_window_must_be_one_nonempty_interval(keys, message):
+    with pytest.raises(ValidationError, match=message):
+        Window.model_validate(keys)

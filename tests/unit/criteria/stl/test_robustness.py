@@ -79,11 +79,11 @@ def test_verdict_does_not_depend_on_the_start_tick(formula, p, later):
             for name in ("truth", "velocity", "clearance")
         },
     )
-    one, other = (
+    original, shifted = (
         robustness(validated(formula), EvaluationContext(some, CASE, run_ended=True)) for some in (trace, moved)
     )
-    assert one.low.tolist() == other.low.tolist()
-    assert one.high.tolist() == other.high.tolist()
+    assert original.low.tolist() == shifted.low.tolist()
+    assert original.high.tolist() == shifted.high.tolist()
 
 
 @pytest.mark.parametrize("samples", [1, 2, 3])

@@ -7,11 +7,11 @@ STEP_S = 6 / 240
 """Time between two samples of a synthetic trace."""
 
 
-def signal(name, words, case=None, **of):
-    """Return the values of a signal in a synthetic trace; `of` are the arguments of the signal."""
-    return read_signal(name, synthetic_trace(words), synthetic_case(case or {}), of)
+def signal(name, trace, case=None, **arguments):
+    """Return the values of a signal in a synthetic trace; `trace` is the description of the trace."""
+    return read_signal(name, synthetic_trace(trace), synthetic_case(case or {}), arguments)
 
 
-def at(values, seconds):
+def value_at(values, seconds):
     """Return the value of a signal at a time in s."""
     return values[round(seconds / STEP_S)]

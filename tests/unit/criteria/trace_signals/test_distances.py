@@ -1,4 +1,4 @@
-"""Distances to pedestrians against shapely, for robots of any shape and heading."""
+"""Tests of distances to pedestrians against shapely, for robots of any shape and heading."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Signals against closed forms, brute force and evo's definition of APE."""
+"""Tests of signals against closed forms, brute force and evo's definition of APE."""
 
 import math
 from dataclasses import replace
@@ -65,8 +65,8 @@ def test_first_lasting_interval_equals_brute_force(true, hold):
     assert first_sustained(ticks, np.array(true), hold, end) == expected
 
 
-def at_half_seconds(xy, placed=()):
-    """A trace with the truth at these points, half a second apart, and set down elsewhere at these seconds."""
+def trace_of_points(xy, placed=()):
+    """Return a trace with one true position (x, y) per 0.5 s; the robot is kidnapped at the times `placed` in s."""
     ticks = np.arange(len(xy), dtype=np.int64) * 120
     truth = Samples(ticks, np.column_stack((np.array(xy, dtype=np.float64), np.zeros(len(xy)))))
     events = [[t, "robot.placed"] for t in placed]
@@ -74,33 +74,33 @@ def at_half_seconds(xy, placed=()):
 
 
 def test_small_motions_accumulate():
-    still = at_half_seconds([(0, 0), (0.0078125, 0), (0, 0), (0, 0.0078125), (0, 0)])
+    still = trace_of_points([(0, 0), (0.0078125, 0), (0, 0), (0, 0.0078125), (0, 0)])
     assert drive(still).length == 0.0
-    creeping = drive(at_half_seconds([(0.0078125 * k, 0) for k in range(9)]))
+    creeping = drive(trace_of_points([(0.0078125 * k, 0) for k in range(9)]))
     assert creeping.length == 0.0625
     assert creeping.ticks.tolist() == [0, 240, 480, 720, 960]
     assert creeping.travelled.tolist() == [0.0, 0.015625, 0.03125, 0.046875, 0.0625]
 
 
 def test_a_move_of_exactly_a_centimeter_counts():
-    assert drive(at_half_seconds([(0, 0), (0.01, 0)])).length == 0.01
-    assert drive(at_half_seconds([(0, 1), (0, 1.5)])).length == 0.5
+    assert drive(trace_of_points([(0, 0), (0.01, 0)])).length == 0.01
+    assert drive(trace_of_points([(0, 1), (0, 1.5)])).length == 0.5
 
 
 def test_teleport_is_not_driven_but_the_motion_after_it_is():
-    way = drive(at_half_seconds([(0, 0), (1, 0), (9, 9), (9, 10)], placed=[0.5]))
+    way = drive(trace_of_points([(0, 0), (1, 0), (9, 9), (9, 10)], placed=[0.5]))
     assert way.length == 2.0
     assert way.travelled.tolist() == [0.0, 1.0, 1.0, 2.0]
-    assert drive(at_half_seconds([(0, 0), (1, 0), (9, 9), (9, 10)])).length > 12
+    assert drive(trace_of_points([(0, 0), (1, 0), (9, 9), (9, 10)])).length > 12
 
 
 def test_distance_driven_at_a_time_is_that_of_the_samples_before():
-    way = drive(at_half_seconds([(0, 0), (1, 0), (2, 0)]))
+    way = drive(trace_of_points([(0, 0), (1, 0), (2, 0)]))
     assert [way.until(tick) for tick in (-1, 0, 119, 120, 239, 240, 9999)] == [0.0, 0.0, 0.0, 1.0, 1.0, 2.0, 2.0]
 
 
 def test_empty_trace_has_no_distance():
-    trace = at_half_seconds([(0, 0)])
+    trace = trace_of_points([(0, 0)])
     empty = replace(trace, truth=Samples(trace.truth.ticks[:0], trace.truth.values[:0]))
     way, error = drive(empty), pose_error(empty)
     assert (way.length, way.until(9), len(way.ticks), len(way.travelled)) == (0.0, 0.0, 0, 0)
@@ -141,7 +141,7 @@ def test_first_object_with_a_nonfinite_pose_is_named():
 
 
 def test_the_true_pose_at_a_tick_is_the_newest_sample():
-    trace = at_half_seconds([(0, 0), (1, 0), (2, 0)])
+    trace = trace_of_points([(0, 0), (1, 0), (2, 0)])
     assert [true_pose(trace, tick).x for tick in (0, 119, 120, 500)] == [0.0, 0.0, 1.0, 2.0]
 
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
-from signal_values import at, signal
+from signal_values import signal, value_at
 
 from simscen.core.geometry.polygons import points_in_polygon
 from simscen.core.messages.navigation import Path
@@ -26,7 +26,7 @@ def test_distance_to_an_absent_object_is_infinite():
         "events": [[1, "object.spawned", "cart"], [3, "object.removed", "cart"]],
     }
     values = signal("distance_to", words, object="cart")
-    assert [at(values, t) for t in (0.975, 1.0, 2.975, 3.0)] == [math.inf, 5.0, 5.0, math.inf]
+    assert [value_at(values, t) for t in (0.975, 1.0, 2.975, 3.0)] == [math.inf, 5.0, 5.0, math.inf]
 
 
 def test_distance_to_static_objects():
@@ -49,14 +49,14 @@ def test_remaining_plan_length_starts_at_the_estimated_position():
         "plans": [[1, [[0, 0], [2, 0], [2, 3]]]],
     }
     left = signal("distance_remaining", words, {"goals": [{"name": "a", "pose": [9, 0, 0]}]})
-    assert at(left, 0) == 9.0
-    assert at(left, 1.0) == pytest.approx(4.0)
-    assert at(left, 4.0) == pytest.approx(1.0)
+    assert value_at(left, 0) == 9.0
+    assert value_at(left, 1.0) == pytest.approx(4.0)
+    assert value_at(left, 4.0) == pytest.approx(1.0)
 
 
 def test_newer_plan_replaces_the_old_one():
     words = {"seconds": 4, "truth": [[0, 1, 1]], "plans": [[1, [[0, 0], [2, 0]]], [2, [[0, 4], [2, 4]]]]}
-    assert [at(signal("plan_deviation", words), t) for t in (0.975, 1.0, 1.975, 2.0)] == [0, 1, 1, 3]
+    assert [value_at(signal("plan_deviation", words), t) for t in (0.975, 1.0, 1.975, 2.0)] == [0, 1, 1, 3]
     with pytest.raises(MissingEvidence, match="no plan"):
         signal("plan_deviation", {"seconds": 1, "truth": [[0, 0, 0]]})
 
@@ -77,7 +77,7 @@ def test_deviation_from_a_plan_of_one_point_is_the_distance_to_it():
 def test_a_robot_is_in_a_region_with_its_center():
     case = {"regions": {"hall": [[1, -1], [3, -1], [3, 1], [2, 0], [1, 1]]}}
     values = signal("in_region", {"seconds": 4, "truth": [[0, 0, 0.5], [4, 4, 0.5]]}, case, region="hall")
-    assert [at(values, t) for t in (0.5, 1.2, 2.0, 2.8, 3.5)] == [0, 1, 0, 1, 0]
+    assert [value_at(values, t) for t in (0.5, 1.2, 2.0, 2.8, 3.5)] == [0, 1, 0, 1, 0]
     with pytest.raises(MissingEvidence, match="no region `hal`"):
         signal("in_region", {"seconds": 4, "truth": [[0, 0, 0.5]]}, case, region="hal")
 
@@ -134,19 +134,19 @@ def test_object_that_is_spawned_again_is_at_its_new_position_at_once():
         [2, "object.spawned", "box", {"x": 5, "y": 0}],
     ]
     values = _distance_to_box(events, [[0, 2], [240, 2], [600, 6]])
-    assert [at(values, t) for t in (0, 0.975, 1, 1.975, 2, 2.475, 2.5)] == [2, 2, math.inf, math.inf, 5, 5, 6]
+    assert [value_at(values, t) for t in (0, 0.975, 1, 1.975, 2, 2.475, 2.5)] == [2, 2, math.inf, math.inf, 5, 5, 6]
 
 
 def test_object_that_replaces_another_has_its_own_position_before_its_first_sample():
     events = [[0, "object.spawned", "box", {"x": 1, "y": 0}], [1, "object.spawned", "box", {"x": 3, "y": 4}]]
     values = _distance_to_box([*events, [3, "object.spawned", "box", {"x": 6, "y": 8}]], [[0, 1], [240, 1], [480, 7]])
-    assert [at(values, t) for t in (0.975, 1, 1.975, 2, 2.975, 3, 4)] == [1, 5, 5, 7, 7, 10, 10]
+    assert [value_at(values, t) for t in (0.975, 1, 1.975, 2, 2.975, 3, 4)] == [1, 5, 5, 7, 7, 10, 10]
 
 
 def test_object_without_samples_is_where_it_was_spawned_last():
     events = [[t, "object.spawned", "box", {"x": x, "y": y}] for t, x, y in ((0, 3, 4), (2, 0, 1))]
     words = {"seconds": 4, "truth": [[0, 0, 0]], "events": [*events, [1, "object.spawned", "cart", {"x": 9, "y": 9}]]}
-    assert [at(signal("distance_to", words, object="box"), t) for t in (0, 1.975, 2, 4)] == [5, 5, 1, 1]
+    assert [value_at(signal("distance_to", words, object="box"), t) for t in (0, 1.975, 2, 4)] == [5, 5, 1, 1]
 
 
 @pytest.mark.parametrize("data", [{"x": 1.0}, {"y": 1.0}, {"x": "1", "y": "1"}, {}])

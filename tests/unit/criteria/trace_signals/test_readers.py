@@ -6,7 +6,7 @@ from typing import get_args
 
 import numpy as np
 import pytest
-from signal_values import at, signal
+from signal_values import signal, value_at
 
 from simscen.core.records.trace import Samples, Trace
 from simscen.criteria.findings import InvalidTrace, MissingEvidence
@@ -67,8 +67,8 @@ def test_goal_is_the_last_accepted_one_also_from_an_event():
     }
     case = {"goals": [{"name": "shelf", "pose": [4, 2, 3.1]}]}
     distance, heading = signal("goal_distance", words, case), signal("goal_heading_error", words, case)
-    assert [at(distance, t) for t in (0, 1, 2.975, 3, 6)] == [5.0, 5.0, 5.0, 7.0, 7.0]
-    assert [at(heading, t) for t in (0, 3)] == pytest.approx([0.1, 2 * math.pi - 6.0])
+    assert [value_at(distance, t) for t in (0, 1, 2.975, 3, 6)] == [5.0, 5.0, 5.0, 7.0, 7.0]
+    assert [value_at(heading, t) for t in (0, 3)] == pytest.approx([0.1, 2 * math.pi - 6.0])
 
 
 def test_goal_pose_comes_from_its_name_unless_its_acceptance_has_a_pose():
@@ -93,19 +93,19 @@ def test_the_first_goal_counts_before_any_is_accepted_and_without_goals_there_is
 
 def test_scan_age_counts_from_the_start_and_from_the_newest_scan():
     age = signal("scan_age", {"seconds": 4, "truth": [[0, 0, 0]], "scans": [[1, 2]]})
-    assert [at(age, t) for t in (0, 0.5, 1.0, 1.05, 2.0, 4.0)] == pytest.approx([0, 0.5, 0, 0.05, 0, 2.0])
+    assert [value_at(age, t) for t in (0, 0.5, 1.0, 1.05, 2.0, 4.0)] == pytest.approx([0, 0.5, 0, 0.05, 0, 2.0])
 
 
 def test_scan_age_without_scans_is_the_time_of_the_run():
     age = signal("scan_age", {"seconds": 4, "truth": [[0, 0, 0]], "scans": []})
-    assert [at(age, t) for t in (0, 0.5, 4.0)] == [0, 0.5, 4.0]
+    assert [value_at(age, t) for t in (0, 0.5, 4.0)] == [0, 0.5, 4.0]
 
 
 def test_belief_error_is_held_until_the_next_belief():
     words = {"seconds": 2, "truth": [[0, 0, 0], [2, 2, 0]], "belief": {"offset": [0.3, 0.4, -0.2]}}
     assert signal("localization_error", words) == pytest.approx([0.5] * 81)
     assert signal("localization_yaw_error", words) == pytest.approx([0.2] * 81)
-    assert at(signal("belief_age", words), 0.175) == pytest.approx(0.075)
+    assert value_at(signal("belief_age", words), 0.175) == pytest.approx(0.075)
 
 
 def test_position_uncertainty_is_that_of_the_worst_direction():
@@ -134,7 +134,7 @@ def test_a_robot_is_localized_from_its_first_belief_until_a_second_after_its_las
     some = (trace.belief.ticks >= 240) & (trace.belief.ticks <= 480)
     trace = replace(trace, belief=Samples(trace.belief.ticks[some], trace.belief.values[some]))
     values = read_signal("localized", trace, synthetic_case({}), {})
-    assert [at(values, t) for t in (0.975, 1.0, 2.0, 3.0, 3.025)] == [0, 1, 1, 1, 0]
+    assert [value_at(values, t) for t in (0.975, 1.0, 2.0, 3.0, 3.025)] == [0, 1, 1, 1, 0]
 
 
 def test_without_a_belief_a_robot_is_not_localized_and_has_no_error():
@@ -150,16 +150,16 @@ def test_command_is_held_and_zero_before_the_first():
     command = Samples(np.array([120, 180]), np.array([[0.3, 0.4, -1.0], [0.0, 0.0, 0.0]]))
     trace = replace(trace, command=command)
     speed, turn = (read_signal(name, trace, synthetic_case({}), {}) for name in ("command_speed", "command_turn_rate"))
-    assert [at(speed, t) for t in (0, 0.475, 0.5, 0.725, 0.75)] == [0, 0, 0.5, 0.5, 0]
-    assert [at(turn, t) for t in (0.475, 0.5, 0.75)] == [0, 1, 0]
+    assert [value_at(speed, t) for t in (0, 0.475, 0.5, 0.725, 0.75)] == [0, 0, 0.5, 0.5, 0]
+    assert [value_at(turn, t) for t in (0.475, 0.5, 0.75)] == [0, 1, 0]
 
 
 def test_fault_is_active_until_its_end_and_event_without_end_until_the_last_sample():
     events = [[1, "fault.started", "lidar.off"], [2, "fault.ended", "lidar.off"], [1.5, "event.started", "cart"]]
     words = {"seconds": 3, "truth": [[0, 0, 0]], "events": events}
     fault, event = signal("fault_active", words, fault="lidar.off"), signal("event_active", words, event="cart")
-    assert [at(fault, t) for t in (0.975, 1, 1.975, 2)] == [0, 1, 1, 0]
-    assert [at(event, t) for t in (1.475, 1.5, 3)] == [0, 1, 1]
+    assert [value_at(fault, t) for t in (0.975, 1, 1.975, 2)] == [0, 1, 1, 0]
+    assert [value_at(event, t) for t in (1.475, 1.5, 3)] == [0, 1, 1]
     assert np.flatnonzero(signal("started", words, event="cart")).tolist() == [60]
     assert np.flatnonzero(signal("started", words, fault="lidar.off")).tolist() == [40]
 
@@ -202,7 +202,7 @@ def test_signal_of_an_unknown_name_is_refused(name, arguments, known):
 def test_goals_that_are_accepted_at_the_same_tick_are_active_together():
     events = [[1, "goal.accepted", "a"], [1, "goal.accepted", "b"], [2, "goal.reached", "a"]]
     values = signal("goal_active", {"seconds": 3, "truth": [[0, 0, 0]], "events": events}, goal="a")
-    assert [at(values, t) for t in (0.975, 1, 1.975, 2)] == [0, 1, 1, 0]
+    assert [value_at(values, t) for t in (0.975, 1, 1.975, 2)] == [0, 1, 1, 0]
 
 
 def test_contacts_with_two_objects_end_independently():
@@ -214,8 +214,8 @@ def test_contacts_with_two_objects_end_independently():
     ]
     words = {"seconds": 4, "truth": [[0, 0, 0]], "events": events}
     values = signal("in_collision", words)
-    assert [at(values, t) for t in (0.975, 1, 2.7, 2.975, 3)] == [0, 1, 1, 1, 0]
-    assert [at(signal("collision_count", words), t) for t in (0.975, 1, 2)] == [0, 1, 2]
+    assert [value_at(values, t) for t in (0.975, 1, 2.7, 2.975, 3)] == [0, 1, 1, 1, 0]
+    assert [value_at(signal("collision_count", words), t) for t in (0.975, 1, 2)] == [0, 1, 2]
 
 
 def test_goal_is_active_until_it_ends_or_is_replaced():
@@ -231,12 +231,12 @@ def test_goal_is_active_until_it_ends_or_is_replaced():
     ]
     words = {"seconds": 4, "truth": [[0, 0, 0]], "events": events}
     first, some = signal("goal_active", words, goal="a"), signal("goal_active", words)
-    assert [at(first, t) for t in (0.975, 1, 1.975, 2)] == [0, 1, 1, 0]
-    assert [at(some, t) for t in (0.975, 1, 2, 2.975, 3)] == [0, 1, 1, 1, 0]
+    assert [value_at(first, t) for t in (0.975, 1, 1.975, 2)] == [0, 1, 1, 0]
+    assert [value_at(some, t) for t in (0.975, 1, 2, 2.975, 3)] == [0, 1, 1, 1, 0]
     assert np.flatnonzero(signal("recovery_active", words, recovery="spin")).tolist() == list(range(140, 150))
     assert not signal("recovery_active", words, recovery="wait").any()
     assert (signal("replan_count", words)[-1], signal("recovery_count", words)[-1]) == (2, 1)
-    assert at(signal("time", words), 3.5) == 3.5
+    assert value_at(signal("time", words), 3.5) == 3.5
 
 
 def test_error_of_a_nonfinite_signal_has_its_name_and_time():
@@ -258,13 +258,17 @@ def test_events_are_counted_in_any_order():
     events = [[1, "recovery.started", "spin"], [2, "recovery.started", "wait"], [3, "recovery.started", "spin"]]
     trace = synthetic_trace({"seconds": 4, "truth": [[0, 0, 0]], "events": events})
     values = read_signal("recovery_count", replace(trace, events=trace.events[::-1]), synthetic_case({}), {})
-    assert [at(values, t) for t in (0, 1, 2, 3, 4)] == [0, 1, 2, 3, 3]
+    assert [value_at(values, t) for t in (0, 1, 2, 3, 4)] == [0, 1, 2, 3, 3]
 
 
 def test_a_goal_matches_its_name_in_each_loop_and_other_names_match_exactly():
     events = [[1, "goal.accepted", "shelf#2"], [2, "goal.reached", "shelf#2"], [3, "recovery.started", "spin#2"]]
     words = {"seconds": 4, "truth": [[0, 0, 0]], "events": events}
-    assert [at(signal("goal_active", words, goal=name), 1.5) for name in ("shelf", "shelf#2", "shelf#1")] == [1, 1, 0]
+    assert [value_at(signal("goal_active", words, goal=name), 1.5) for name in ("shelf", "shelf#2", "shelf#1")] == [
+        1,
+        1,
+        0,
+    ]
     assert signal("recovery_active", words, recovery="spin#2").any()
     assert not signal("recovery_active", words, recovery="spin").any()
 

@@ -1,4 +1,4 @@
-"""Resampling of uneven signals, and gaps in them, in closed form."""
+"""Tests of the resampling of uneven signals, and gaps in them, in closed form."""
 
 from dataclasses import replace
 
@@ -13,11 +13,11 @@ from simscen.criteria.trace_signals.sparc_ldlj import evenly_sampled_speed
 from simscen.criteria.trace_signals.trace_checks import check_recorded_signals, time_gaps
 from simscen.testing.synthetic_trace import synthetic_trace
 
-RATE = 240
+TICK_RATE_HZ = 240
 
 
 def samples(*ticks: int) -> Samples:
-    """Samples of a signal that equals twice the tick."""
+    """Return samples of a signal that equals twice the tick."""
     return Samples(np.array(ticks), 2.0 * np.array(ticks)[:, np.newaxis])
 
 
@@ -30,35 +30,35 @@ def test_period_is_the_median_spacing(ticks: list[int], period: int) -> None:
 
 def test_even_samples_are_not_resampled() -> None:
     even = samples(6, 12, 18, 24)
-    assert evenly_spaced(even, RATE) is even
+    assert evenly_spaced(even, TICK_RATE_HZ) is even
 
 
 def test_uneven_samples_are_interpolated_from_the_first_to_the_last() -> None:
-    found = evenly_spaced(samples(10, 20, 30, 41, 50), RATE)
+    found = evenly_spaced(samples(10, 20, 30, 41, 50), TICK_RATE_HZ)
     assert found.ticks.tolist() == [10, 20, 30, 40, 50]
     assert found.values[:, 0].tolist() == [20.0, 40.0, 60.0, 80.0, 100.0]
 
 
 def test_resampling_ends_at_the_last_grid_point() -> None:
-    assert evenly_spaced(samples(0, 10, 20, 29), RATE).ticks.tolist() == [0, 10, 20]
-    assert evenly_spaced(samples(0, 10, 20, 31), RATE).ticks.tolist() == [0, 10, 20, 30]
-    assert evenly_spaced(samples(0, 10, 20, 30, 39), RATE).ticks.tolist() == [0, 10, 20, 30]
-    assert evenly_spaced(samples(0, 1, 3, 5), RATE).ticks.tolist() == [0, 2, 4]
+    assert evenly_spaced(samples(0, 10, 20, 29), TICK_RATE_HZ).ticks.tolist() == [0, 10, 20]
+    assert evenly_spaced(samples(0, 10, 20, 31), TICK_RATE_HZ).ticks.tolist() == [0, 10, 20, 30]
+    assert evenly_spaced(samples(0, 10, 20, 30, 39), TICK_RATE_HZ).ticks.tolist() == [0, 10, 20, 30]
+    assert evenly_spaced(samples(0, 1, 3, 5), TICK_RATE_HZ).ticks.tolist() == [0, 2, 4]
 
 
 def test_too_few_samples_are_refused() -> None:
     with pytest.raises(MissingEvidence, match="1 sample of the truth"):
-        evenly_spaced(samples(5), RATE)
+        evenly_spaced(samples(5), TICK_RATE_HZ)
 
 
 @pytest.mark.parametrize("ticks", [(0, 0, 0), (0, 10, 10, 20), (0, 20, 10)])
 def test_spacing_of_unordered_samples_is_undefined(ticks: tuple[int, ...]) -> None:
     with pytest.raises(MissingEvidence, match="chronological order"):
-        evenly_spaced(samples(*ticks), RATE)
+        evenly_spaced(samples(*ticks), TICK_RATE_HZ)
 
 
 def with_truth_at(*ticks: int, end: int = 480):  # type: ignore[no-untyped-def]
-    trace = synthetic_trace({"seconds": end / RATE, "truth": [[0, 0, 0]], "clearance": 1.0})
+    trace = synthetic_trace({"seconds": end / TICK_RATE_HZ, "truth": [[0, 0, 0]], "clearance": 1.0})
     truth = Samples(np.array(ticks), np.zeros((len(ticks), 6)))
     return replace(trace, truth=truth, velocity=truth)
 
@@ -99,7 +99,7 @@ def test_smoothness_needs_18_samples_a_second(period: int, is_enough: bool) -> N
     """At 240 ticks a second, 13 ticks are 18.46 Hz, and 14 ticks are 17.14 Hz."""
     ticks = range(0, 480, period)
     if is_enough:
-        assert evenly_sampled_speed(with_truth_at(*ticks))[1] == pytest.approx(RATE / period)
+        assert evenly_sampled_speed(with_truth_at(*ticks))[1] == pytest.approx(TICK_RATE_HZ / period)
     else:
         with pytest.raises(MissingEvidence, match="too few for changes up to 10 Hz"):
             evenly_sampled_speed(with_truth_at(*ticks))

@@ -10,8 +10,8 @@ import pytest
 from simscen.criteria.trace_signals.sparc_ldlj import ldlj, sparc
 
 
-def by_definition(speeds, rate):
-    """SPARC as its authors' code has it: up to 10 Hz, from the first to the last frequency with 5 % of the greatest."""
+def sparc_by_definition(speeds, rate):
+    """Return SPARC as its authors do: up to 10 Hz, from the first to the last frequency with 5 % of the maximum."""
     count = 2 ** (math.ceil(math.log2(len(speeds))) + 4)
     turns = [-2j * math.pi * k / count for k in range(count // 2 + 1)]
     heights = [abs(sum(v * cmath.exp(turn * n) for n, v in enumerate(speeds))) for turn in turns]
@@ -38,16 +38,16 @@ PROFILES = {
 @pytest.mark.parametrize("rate", [5.0, 40.0, 100.0])
 @pytest.mark.parametrize("profile", PROFILES)
 def test_sparc_is_the_arc_length_of_the_spectrum(profile, rate):
-    assert sparc(PROFILES[profile], rate) == pytest.approx(by_definition(PROFILES[profile].tolist(), rate))
+    assert sparc(PROFILES[profile], rate) == pytest.approx(sparc_by_definition(PROFILES[profile].tolist(), rate))
 
 
 def test_frequency_at_five_percent_of_the_peak_belongs_to_the_arc():
     """At half the rate, where 10.5 - 9.5 is 5 % of 10.5 + 9.5."""
-    assert sparc(np.array([10.5, 9.5]), 20.0) == pytest.approx(by_definition([10.5, 9.5], 20.0), rel=1e-12)
+    assert sparc(np.array([10.5, 9.5]), 20.0) == pytest.approx(sparc_by_definition([10.5, 9.5], 20.0), rel=1e-12)
 
 
 def test_sparc_needs_two_frequencies_below_the_cutoff_and_two_samples():
-    assert sparc(np.array([1.0, 1.0]), 200.0) == pytest.approx(by_definition([1.0, 1.0], 200.0))
+    assert sparc(np.array([1.0, 1.0]), 200.0) == pytest.approx(sparc_by_definition([1.0, 1.0], 200.0))
     assert sparc(np.array([1.0, 1.0]), 1000.0) is None
     assert sparc(np.array([1.0]), 40.0) is None
 

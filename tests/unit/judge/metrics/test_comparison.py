@@ -42,15 +42,15 @@ def run(stack: str, seed: int = 1, scenario: str = "a", outcome: Outcome = Outco
     )
 
 
-def against(*runs: RunResult):
+def stack_comparison(*runs: RunResult):
     comparison = compare_stacks(runs, STACKS)
     assert comparison is not None
-    (one,) = comparison.baseline_comparisons
-    return one
+    (baseline_comparison,) = comparison.baseline_comparisons
+    return baseline_comparison
 
 
-def of(one, metric: str):
-    return next(found for found in one.differences if found.metric == metric)
+def difference_of(baseline_comparison, metric: str):
+    return next(difference for difference in baseline_comparison.differences if difference.metric == metric)
 
 
 def test_single_stack_has_no_comparison() -> None:
@@ -72,42 +72,60 @@ def test_outcomes_are_counted_by_scenario_and_stack_with_separate_errors() -> No
 
 def test_differences_are_between_runs_with_the_same_scenario_and_seed() -> None:
     """Only seed 1 was run with both stacks; the means of all runs differ by 100 s."""
-    one = against(run("ref", 1, time_to_goal=10.0), run("mine", 1, time_to_goal=12.0), run("mine", 2, time_to_goal=210))
-    found = of(one, "time_to_goal")
+    baseline_comparison = stack_comparison(
+        run("ref", 1, time_to_goal=10.0), run("mine", 1, time_to_goal=12.0), run("mine", 2, time_to_goal=210)
+    )
+    found = difference_of(baseline_comparison, "time_to_goal")
     assert (found.pairs, found.baseline, found.value, found.difference) == (1, 10.0, 12.0, 2.0)
     assert (found.lower, found.equal, found.higher, found.p) == (0, 0, 1, 1.0)
     assert found.interval is None
-    assert one.unpaired_runs == 1
+    assert baseline_comparison.unpaired_runs == 1
 
 
 def test_runs_with_errors_are_counted_and_not_compared() -> None:
-    one = against(run("ref", 1), run("mine", 1, outcome=Outcome.ERROR), run("ref", 2), run("mine", 2))
-    assert (one.pairs, one.error_pairs, one.unpaired_runs, one.flips) == (1, 1, 0, ())
-    assert of(one, "path_length").pairs == 1
+    baseline_comparison = stack_comparison(
+        run("ref", 1), run("mine", 1, outcome=Outcome.ERROR), run("ref", 2), run("mine", 2)
+    )
+    assert (
+        baseline_comparison.pairs,
+        baseline_comparison.error_pairs,
+        baseline_comparison.unpaired_runs,
+        baseline_comparison.flips,
+    ) == (1, 1, 0, ())
+    assert difference_of(baseline_comparison, "path_length").pairs == 1
 
 
 def test_flip_states_the_failing_stack_and_the_reason() -> None:
-    one = against(
+    baseline_comparison = stack_comparison(
         *(run("ref", 1), run("mine", 1, outcome=Outcome.FAILED)),
         *(run("ref", 2, outcome=Outcome.FAILED), run("mine", 2)),
         *(run("ref", 3, outcome=Outcome.FAILED), run("mine", 3, outcome=Outcome.FAILED)),
     )
-    assert [(flip.seed, flip.passed, flip.failed) for flip in one.flips] == [(1, "ref", "mine"), (2, "mine", "ref")]
-    assert one.flips[0].why == "clearance: 0.03 m < 0.05 m, at t = 1.00 s, (1.00, 2.00)"
-    assert one.p == 1.0
+    assert [(flip.seed, flip.passed, flip.failed) for flip in baseline_comparison.flips] == [
+        (1, "ref", "mine"),
+        (2, "mine", "ref"),
+    ]
+    assert baseline_comparison.flips[0].why == "clearance: 0.03 m < 0.05 m, at t = 1.00 s, (1.00, 2.00)"
+    assert baseline_comparison.p == 1.0
 
 
 def test_aborted_run_is_not_compared_by_path_length() -> None:
     gave_up = run("mine", 1, outcome=Outcome.FAILED, time_to_goal=None, path_length=1.0, collisions=2.0)
-    one = against(run("ref", 1), gave_up, run("ref", 2), run("mine", 2, path_length=5.5))
-    assert one.pairs_with_different_arrivals == 1
-    assert (of(one, "path_length").pairs, of(one, "path_length").difference) == (1, 0.5)
-    assert (of(one, "collisions").pairs, of(one, "collisions").difference) == (2, 1.0)
+    baseline_comparison = stack_comparison(run("ref", 1), gave_up, run("ref", 2), run("mine", 2, path_length=5.5))
+    assert baseline_comparison.pairs_with_different_arrivals == 1
+    assert (
+        difference_of(baseline_comparison, "path_length").pairs,
+        difference_of(baseline_comparison, "path_length").difference,
+    ) == (1, 0.5)
+    assert (
+        difference_of(baseline_comparison, "collisions").pairs,
+        difference_of(baseline_comparison, "collisions").difference,
+    ) == (2, 1.0)
 
 
 def test_determinism_runs_are_not_compared() -> None:
-    one = against(run("ref"), run("ref.again"), run("mine"), run("mine.again"))
-    assert one.pairs == 1
+    baseline_comparison = stack_comparison(run("ref"), run("ref.again"), run("mine"), run("mine.again"))
+    assert baseline_comparison.pairs == 1
 
 
 def test_comparison_is_with_the_first_stack_in_any_order_of_runs() -> None:
@@ -117,8 +135,8 @@ def test_comparison_is_with_the_first_stack_in_any_order_of_runs() -> None:
     assert compare_stacks(runs, stacks) == compare_stacks(runs[::-1], stacks)
     comparison = compare_stacks(runs, stacks)
     assert comparison is not None
-    assert [one.stack for one in comparison.baseline_comparisons] == ["mine", "other"]
-    found = of(comparison.baseline_comparisons[1], "time_to_goal")
+    assert [baseline.stack for baseline in comparison.baseline_comparisons] == ["mine", "other"]
+    found = difference_of(comparison.baseline_comparisons[1], "time_to_goal")
     assert found.interval is not None
     assert found.interval[0] < found.difference < found.interval[1]
     assert found.difference == pytest.approx(0.2 * 4.5)
@@ -136,7 +154,7 @@ def test_comparison_as_data_is_strict_json_with_excluded_runs() -> None:
 
 
 def test_metrics_of_packages_are_compared() -> None:
-    found = of(against(run("ref", headway=2.0), run("mine", headway=2.5)), "headway")
+    found = difference_of(stack_comparison(run("ref", headway=2.0), run("mine", headway=2.5)), "headway")
     assert (found.difference, found.unit, found.pairs) == (0.5, "", 1)
 
 
@@ -153,13 +171,13 @@ def test_expected_failures_are_compared_as_failures() -> None:
         reason="NAV-1",
         verdicts=(Verdict("expected", "expected", "fail", (broken,)),),
     )
-    (flip,) = against(known, mended).flips
+    (flip,) = stack_comparison(known, mended).flips
     assert (flip.passed, flip.failed) == ("mine", "ref")
 
 
 def test_skipped_run_is_not_compared() -> None:
     skipped = [replace(run(name), outcome=Outcome.SKIPPED, verdicts=(), reason="NAV-1") for name in ("ref", "mine")]
-    assert against(*skipped, run("ref", 2), run("mine", 2)).pairs == 1
+    assert stack_comparison(*skipped, run("ref", 2), run("mine", 2)).pairs == 1
 
 
 def fleet(stack: str, seed: int = 1, **metrics: float | None) -> RunResult:
@@ -170,17 +188,24 @@ def fleet(stack: str, seed: int = 1, **metrics: float | None) -> RunResult:
 
 
 def test_metrics_of_each_robot_are_compared() -> None:
-    one = against(fleet("ref"), fleet("mine", b_path_length=7.0))
+    baseline_comparison = stack_comparison(fleet("ref"), fleet("mine", b_path_length=7.0))
     names = [name for name in COMPARED_METRICS if name in GOOD]
-    assert [found.metric for found in one.differences] == [f"{robot}/{name}" for robot in "ab" for name in names]
-    assert [of(one, f"{robot}/path_length").difference for robot in "ab"] == [0.0, 2.0]
-    assert of(one, "b/path_length").unit == METRICS["path_length"].unit
+    assert [found.metric for found in baseline_comparison.differences] == [
+        f"{robot}/{name}" for robot in "ab" for name in names
+    ]
+    assert [difference_of(baseline_comparison, f"{robot}/path_length").difference for robot in "ab"] == [0.0, 2.0]
+    assert difference_of(baseline_comparison, "b/path_length").unit == METRICS["path_length"].unit
 
 
 def test_pair_in_which_different_robots_arrived_is_compared_only_by_collisions() -> None:
-    one = against(fleet("ref", a_time_to_goal=None), fleet("mine", b_time_to_goal=None, a_collisions=1.0))
-    assert one.pairs_with_different_arrivals == 1
-    assert {found.metric: found.difference for found in one.differences} == {"a/collisions": 1.0, "b/collisions": 0.0}
+    baseline_comparison = stack_comparison(
+        fleet("ref", a_time_to_goal=None), fleet("mine", b_time_to_goal=None, a_collisions=1.0)
+    )
+    assert baseline_comparison.pairs_with_different_arrivals == 1
+    assert {found.metric: found.difference for found in baseline_comparison.differences} == {
+        "a/collisions": 1.0,
+        "b/collisions": 0.0,
+    }
 
 
 @given(st.lists(st.integers(-30, 30), min_size=1, max_size=9, unique_by=abs).filter(lambda values: 0 not in values))
@@ -220,8 +245,8 @@ def sessions(worse: dict[str, float], seeds: int = 12, failing: int = 0, scenari
         for seed in range(seeds)
     ]
     comparison = compare_sessions({"before": before, "now": now}, {"before": "b", "now": "n"}, Significance())
-    (one,) = comparison.baseline_comparisons
-    return one
+    (baseline_comparison,) = comparison.baseline_comparisons
+    return baseline_comparison
 
 
 def test_changes_state_which_direction_is_worse() -> None:
@@ -236,9 +261,12 @@ def test_metric_of_a_package_has_no_worse_direction() -> None:
     before = [run("", seed, added=1.0, another=1.0) for seed in range(8)]
     now = [run("", seed, added=2.0, another=2.0) for seed in range(8)]
     comparison = compare_sessions({"before": before, "now": now}, {"before": "b", "now": "n"}, Significance())
-    (one,) = comparison.baseline_comparisons
-    assert [(change.what, change.is_worse) for change in one.changes] == [("added", None), ("another", None)]
-    assert [found.metric for found in one.differences][-2:] == ["added", "another"]
+    (baseline_comparison,) = comparison.baseline_comparisons
+    assert [(change.what, change.is_worse) for change in baseline_comparison.changes] == [
+        ("added", None),
+        ("another", None),
+    ]
+    assert [found.metric for found in baseline_comparison.differences][-2:] == ["added", "another"]
 
 
 def test_the_pass_rate_over_all_scenarios_is_tested_if_there_are_several() -> None:
@@ -253,25 +281,27 @@ def test_the_pass_rate_over_all_scenarios_is_tested_if_there_are_several() -> No
 
 def test_metric_is_compared_if_both_runs_have_it() -> None:
     runs = [run("ref", 1, recoveries=1.0), run("mine", 1, recoveries=None), run("ref", 2, recoveries=2.0)]
-    one = against(*runs, run("mine", 2, recoveries=2.0), run("ref", 3, recoveries=5.0), run("mine", 3, recoveries=4.5))
-    found = of(one, "recoveries")
+    baseline_comparison = stack_comparison(
+        *runs, run("mine", 2, recoveries=2.0), run("ref", 3, recoveries=5.0), run("mine", 3, recoveries=4.5)
+    )
+    found = difference_of(baseline_comparison, "recoveries")
     assert (found.pairs, found.lower, found.equal, found.higher) == (2, 1, 1, 0)
     assert (found.baseline, found.value, found.difference) == (3.5, 3.25, -0.25)
 
 
 def test_pairs_with_a_robot_that_arrived_in_one_run_only_are_excluded() -> None:
     both = {"a/time_to_goal": 5.0, "b/time_to_goal": 6.0}
-    one = against(
+    baseline_comparison = stack_comparison(
         run("ref", 1, **both), run("mine", 1, **{**both, "b/time_to_goal": None}), run("ref", 2), run("mine", 2)
     )
-    assert (one.pairs, one.pairs_with_different_arrivals) == (2, 1)
+    assert (baseline_comparison.pairs, baseline_comparison.pairs_with_different_arrivals) == (2, 1)
 
 
 @pytest.mark.parametrize(("count", "more"), [(1, ""), (2, " (and 1 more)"), (3, " (and 2 more)")])
 def test_flip_states_the_first_reason_and_the_number_of_others(count: int, more: str) -> None:
     bad = run("mine", outcome=Outcome.FAILED)
     warning = replace(bad.verdicts[0], severity="warn")
-    (flip,) = against(run("ref"), replace(bad, verdicts=(warning, *bad.verdicts * count))).flips
+    (flip,) = stack_comparison(run("ref"), replace(bad, verdicts=(warning, *bad.verdicts * count))).flips
     assert flip.why == f"clearance: 0.03 m < 0.05 m, at t = 1.00 s, (1.00, 2.00){more}"
 
 
@@ -280,13 +310,15 @@ def test_differences_are_counted_by_direction_and_written_with_their_interval(pa
     runs = [run(name, seed, headway=2.0 + 0.5 * k) for seed in range(pairs) for k, name in enumerate(("ref", "mine"))]
     comparison = compare_stacks(runs, STACKS)
     assert comparison is not None
-    found = of(comparison.baseline_comparisons[0], "headway")
+    found = difference_of(comparison.baseline_comparisons[0], "headway")
     assert (found.lower, found.equal, found.higher) == (0, 0, pairs)
-    data = next(one for one in comparison_data(comparison)["against"][0]["differences"] if one["metric"] == "headway")
+    data = next(row for row in comparison_data(comparison)["against"][0]["differences"] if row["metric"] == "headway")
     assert data["interval"] == ([0.5, 0.5] if has_interval else None)
 
 
 def test_metrics_of_packages_are_in_the_order_of_their_names() -> None:
     metrics = {f"metric_{letter}": 1.0 for letter in "hgfedcba"}
-    names = [one.metric for one in against(run("ref", **metrics), run("mine", **metrics)).differences]
+    names = [
+        difference.metric for difference in stack_comparison(run("ref", **metrics), run("mine", **metrics)).differences
+    ]
     assert [name for name in names if name.startswith("metric_")] == sorted(metrics)

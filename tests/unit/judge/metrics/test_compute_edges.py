@@ -26,8 +26,8 @@ EVENTS = [
 ]
 
 
-def measures(events=(), case=GOALS, **words):
-    return compute_metrics(synthetic_trace({**TOUR, "events": list(events), **words}), synthetic_case(case))
+def measures(events=(), case=GOALS, **trace_keys):
+    return compute_metrics(synthetic_trace({**TOUR, "events": list(events), **trace_keys}), synthetic_case(case))
 
 
 def test_time_to_goal_is_from_first_acceptance_to_last_arrival():
@@ -100,7 +100,7 @@ def test_paths_of_half_a_meter_have_a_score():
     assert barn_score(True, 1.0, 0.5) == pytest.approx(0.25)
 
 
-def with_speeds(speeds, ticks=None):
+def metrics_of_speeds(speeds, ticks=None):
     trace = synthetic_trace({"seconds": (len(speeds) - 1) / 40, "truth": [[0, 0, 0]]})
     values = np.column_stack((speeds, np.zeros((len(speeds), 2))))
     velocity = Samples(trace.truth.ticks if ticks is None else ticks, values)
@@ -108,20 +108,20 @@ def with_speeds(speeds, ticks=None):
 
 
 def test_a_centimeter_a_second_is_motion():
-    assert with_speeds(np.full(81, 0.01)).values["sparc"] < 0
-    assert with_speeds(np.full(81, 0.0099)).undefined["sparc"] == "the robot never moved"
+    assert metrics_of_speeds(np.full(81, 0.01)).values["sparc"] < 0
+    assert metrics_of_speeds(np.full(81, 0.0099)).undefined["sparc"] == "the robot never moved"
 
 
 def test_smoothness_needs_at_least_two_samples():
-    assert with_speeds(np.array([1.0, 0.5])).values["sparc"] == sparc(np.array([1.0, 0.5]), 40.0)
-    one = with_speeds(np.array([1.0]))
-    assert one.undefined["sparc"] == one.undefined["ldlj"] == "the run is too short: 1 sample of the truth"
+    assert metrics_of_speeds(np.array([1.0, 0.5])).values["sparc"] == sparc(np.array([1.0, 0.5]), 40.0)
+    metrics = metrics_of_speeds(np.array([1.0]))
+    assert metrics.undefined["sparc"] == metrics.undefined["ldlj"] == "the run is too short: 1 sample of the truth"
 
 
 def test_smoothness_uses_the_sampling_rate_not_the_start_time():
     speeds = np.array([1.0, *np.tile([0.5, 1.0], 20)])  # of 20 Hz, which is noise at this rate and no other
     assert sparc(speeds, 40.0) != sparc(speeds, 0.2)
-    assert with_speeds(speeds, 600 + 6 * np.arange(41)).values["sparc"] == sparc(speeds, 40.0)
+    assert metrics_of_speeds(speeds, 600 + 6 * np.arange(41)).values["sparc"] == sparc(speeds, 40.0)
 
 
 def contact(at, kind):

@@ -9,7 +9,7 @@ ANNA = [0, "object.spawned", "anna", {"person": True, "size": [0.25, 1.7]}]
 
 
 def test_approaching_robot_spends_the_computed_time_in_each_zone():
-    """It drives at 1 m/s from a gap of 4.55 m to one of 0.05 m and stops: 2.4 m are 24 % of 10 s, and so on."""
+    """The robot drives at 1 m/s from 4.55 m to 0.05 m away and stops: 2.4 m are 24 % of 10 s, and so on."""
     waypoints = [[0, 0, 0], [4.5, 4.5, 0], [10, 4.5, 0]]
     trace = synthetic_trace({"seconds": 10, "truth": waypoints, "objects": {"anna": [[0, 5, 0]]}, "events": [ANNA]})
     found = person_metrics(trace, synthetic_case({"inscribed_radius": 0.2}))

@@ -1,4 +1,4 @@
-"""Metrics of installed packages, and the zones around people at their limits."""
+"""Tests of metrics of installed packages, and of the limits of the zones around people."""
 
 import math
 from dataclasses import replace

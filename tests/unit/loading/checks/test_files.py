@@ -1,3 +1,5 @@
+"""Tests of checks of all kinds of files."""
+
 from collections.abc import Callable
 from pathlib import Path
 

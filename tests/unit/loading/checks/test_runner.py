@@ -1,3 +1,5 @@
+"""Tests of the semantic checks of scenarios."""
+
 from collections.abc import Callable
 from pathlib import Path
 
@@ -7,22 +9,22 @@ from simscen.core.errors import Problem
 from tests.scenario_files import try_scenario
 
 Write = Callable[[str, str], Path]
-Told = Callable[[str], list[Problem]]
+ProblemsOf = Callable[[str], list[Problem]]
 
 
 @pytest.fixture
-def expected(write: Write, scenario: str, tmp_path: Path) -> Told:
-    """What is wrong with the valid scenario after more lines were added to it."""
+def problems_with(write: Write, scenario: str, tmp_path: Path) -> ProblemsOf:
+    """Return the problems of the valid scenario with additional lines."""
 
-    def problems(more: str) -> list[Problem]:
-        found = try_scenario(write("a.scenario.yaml", scenario + more), tmp_path)
+    def problems(lines: str) -> list[Problem]:
+        found = try_scenario(write("a.scenario.yaml", scenario + lines), tmp_path)
         return found if isinstance(found, list) else []
 
     return problems
 
 
-def test_the_scenario_without_more_is_consistent(expected: Told) -> None:
-    assert expected("") == []
+def test_the_scenario_without_additional_lines_is_consistent(problems_with: ProblemsOf) -> None:
+    assert problems_with("") == []
 
 
 @pytest.mark.parametrize(
@@ -38,10 +40,10 @@ def test_the_scenario_without_more_is_consistent(expected: Told) -> None:
         "{all: [{time: 1}, {not: {any: [{robot_in: {region: hall}}]}}]}",
     ],
 )
-def test_names_of_the_world_and_of_the_scenario_are_known(expected: Told, trigger: str) -> None:
+def test_names_of_the_world_and_of_the_scenario_are_known(problems_with: ProblemsOf, trigger: str) -> None:
     events = "- {name: falls, when: {time: 1}, do: {spawn: {name: box, box: [1, 1, 1], ahead: [1, 0]}}}"
     more = "- {when: {time: 2}, do: [{new_goal: {name: detour, pose: {x: 1, y: 1}}}]}"
-    assert expected(f"events:\n  {events}\n  {more}\n  - {{when: {trigger}, do: {{cancel_goal: {{}}}}}}\n") == []
+    assert problems_with(f"events:\n  {events}\n  {more}\n  - {{when: {trigger}, do: {{cancel_goal: {{}}}}}}\n") == []
 
 
 @pytest.mark.parametrize(
@@ -56,17 +58,17 @@ def test_names_of_the_world_and_of_the_scenario_are_known(expected: Told, trigge
         "{collision: {with: nobody}}",
     ],
 )
-def test_unknown_names_are_reported_everywhere(expected: Told, trigger: str) -> None:
-    problems = expected(f"events:\n  - {{when: {trigger}, do: {{cancel_goal: {{}}}}}}\n")
+def test_unknown_names_are_reported_everywhere(problems_with: ProblemsOf, trigger: str) -> None:
+    problems = problems_with(f"events:\n  - {{when: {trigger}, do: {{cancel_goal: {{}}}}}}\n")
     assert [(p.code, p.line) for p in problems] == [("SC030", 7)]
 
 
-def test_criteria_may_wait_for_faults_by_label_or_name(expected: Told) -> None:
+def test_criteria_may_wait_for_faults_by_label_or_name(problems_with: ProblemsOf) -> None:
     faults = "faults: [{sensor: front, off: {}}, {sensor: odom, slip: {}, name: wet}]\n"
     text = faults + "events: [{name: x, when: {time: 1}, do: {cancel_goal: {}}}]\n"
     criteria = "".join(f"- stopped_within: {{time: 1, after: {name}}}\n" for name in ("front.off", "wet", "x"))
-    assert expected(text + "pass:\n" + criteria)[0].code == "SC007"  # the scenario has a `pass` already
-    assert expected(text) == []
+    assert problems_with(text + "pass:\n" + criteria)[0].code == "SC007"  # the scenario has a `pass` already
+    assert problems_with(text) == []
 
 
 def test_objects_of_imported_worlds_are_not_second_guessed(write: Write, scenario: str, tmp_path: Path) -> None:
@@ -78,18 +80,18 @@ def test_objects_of_imported_worlds_are_not_second_guessed(write: Write, scenari
     assert not isinstance(try_scenario(write("a.scenario.yaml", text + more), tmp_path), list)
 
 
-def test_a_fault_must_fit_its_sensor(expected: Told) -> None:
-    problems = expected("faults:\n  - {sensor: front, slip: {left: 10 %}}\n  - {sensor: rear, off: {}}\n")
+def test_a_fault_must_fit_its_sensor(problems_with: ProblemsOf) -> None:
+    problems = problems_with("faults:\n  - {sensor: front, slip: {left: 10 %}}\n  - {sensor: rear, off: {}}\n")
     assert [(p.code, p.line, p.col) for p in problems] == [("SC032", 7, 21), ("SC031", 8, 14)]
     assert problems[0].hint == "it can affect: odom, wheels"
     assert problems[1].hint == "expected one of: front, odom, cmd_vel, wheels, localizer, map"
 
 
-def test_rates_must_divide_the_ticks_where_they_are_written(write: Write, expected: Told) -> None:
-    assert [p.place for p in expected("stack: {controller_frequency: 7}\n")] == ["a.scenario.yaml:6:31"]
+def test_rates_must_divide_the_ticks_where_they_are_written(write: Write, problems_with: ProblemsOf) -> None:
+    assert [p.place for p in problems_with("stack: {controller_frequency: 7}\n")] == ["a.scenario.yaml:6:31"]
     robot = (write("x", "").parent / "cube.robot.yaml").read_text()
     write("cube.robot.yaml", robot.replace("10 Hz", "11 Hz"))
-    problem = expected("")[0]
+    problem = problems_with("")[0]
     assert problem.place == "cube.robot.yaml:8:25"
     assert problem.message.endswith("11 Hz does not divide 240 Hz; the nearest that does is 10 Hz")
 

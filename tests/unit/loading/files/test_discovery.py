@@ -1,3 +1,5 @@
+"""Tests of the search for scenarios, of the root, and of the IDs of scenarios."""
+
 import os
 import shutil
 from pathlib import Path

@@ -1,3 +1,5 @@
+"""Tests of the paths of files, which must be inside the root or the world path."""
+
 import os
 from pathlib import Path
 

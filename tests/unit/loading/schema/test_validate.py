@@ -23,7 +23,7 @@ def _problems(model: type[BaseModel], text: str) -> list[Problem]:
     return found if isinstance(found, list) else []
 
 
-def _told(model: type[BaseModel], text: str) -> list[tuple[int, int, str]]:
+def _positions_and_messages(model: type[BaseModel], text: str) -> list[tuple[int, int, str]]:
     return [(p.line, p.col, p.message) for p in _problems(model, text)]
 
 
@@ -58,28 +58,32 @@ def test_a_valid_scenario_becomes_its_model() -> None:
     ("value", "bound"), [("600 mm/h", "500 mm/h"), ("1 m/h", "0.5 m/h"), ("0.1", "0.0001388888888888889")]
 )
 def test_a_bound_has_the_unit_of_the_value_and_is_not_rounded(value: str, bound: str) -> None:
-    expected = _told(ScenarioSpec, SCENARIO + f"faults: [{{sensor: lidar, rain: {{rate: {value}}}}}]\n")
+    expected = _positions_and_messages(
+        ScenarioSpec, SCENARIO + f"faults: [{{sensor: lidar, rain: {{rate: {value}}}}}]\n"
+    )
     assert expected == [(5, 39, f"must be at most {bound}, got `{value}`")]
 
 
 def test_a_bound_of_a_ratio_in_percent_is_in_percent() -> None:
-    expected = _told(ScenarioSpec, SCENARIO + "faults: [{sensor: lidar, rain: {rate: 1 mm/h, reflectivity: 150 %}}]\n")
+    expected = _positions_and_messages(
+        ScenarioSpec, SCENARIO + "faults: [{sensor: lidar, rain: {rate: 1 mm/h, reflectivity: 150 %}}]\n"
+    )
     assert expected == [(5, 61, "must be at most 100 %, got `150 %`")]
 
 
 def test_names_of_fields_in_python_are_no_keys() -> None:
-    expected = _told(ScenarioSpec, SCENARIO + "faults: [{sensor: lidar, off: {}, for_: 3 s}]\n")
+    expected = _positions_and_messages(ScenarioSpec, SCENARIO + "faults: [{sensor: lidar, off: {}, for_: 3 s}]\n")
     assert expected == [(5, 35, "unknown key `for_` in `faults[0]`")]
 
 
 def test_mistake_in_a_union_member_is_reported_for_that_member() -> None:
     text = SCENARIO + "events:\n  - when: {time: 1}\n    do:\n      - {remove: {name: a}}\n      - {remove: {nam: b}}\n"
-    assert _told(ScenarioSpec, text) == [(9, 19, "unknown key `nam` in `events[0].do[1].remove`")]
+    assert _positions_and_messages(ScenarioSpec, text) == [(9, 19, "unknown key `nam` in `events[0].do[1].remove`")]
 
 
 def test_type_is_optional_if_there_is_a_default() -> None:
-    assert _told(ScenarioSpec, SCENARIO + "stack: {controller: {lookahead_dist: 1}}\n") == []
-    expected = _told(ScenarioSpec, SCENARIO + "stack: {controller: {sim_time: 1}}\n")
+    assert _positions_and_messages(ScenarioSpec, SCENARIO + "stack: {controller: {lookahead_dist: 1}}\n") == []
+    expected = _positions_and_messages(ScenarioSpec, SCENARIO + "stack: {controller: {sim_time: 1}}\n")
     assert expected == [(5, 22, "unknown key `sim_time` in `stack.controller`")]
 
 
@@ -99,17 +103,17 @@ def test_a_missing_type_lists_the_types() -> None:
 
 
 def test_a_mapping_may_be_expected_where_a_type_would_tell_which() -> None:
-    expected = _told(ScenarioSpec, SCENARIO + "stack: {localizer: amcl}\n")
+    expected = _positions_and_messages(ScenarioSpec, SCENARIO + "stack: {localizer: amcl}\n")
     assert expected == [(5, 20, "expected a mapping, got the text `amcl`")]
 
 
 def test_keys_of_names_are_checked_at_the_key() -> None:
-    expected = _told(WorldSpec, "simscen: 1\nplaces:\n  ok: {x: 1, y: 2}\n  no/t: {x: 1, y: 2}\n")
+    expected = _positions_and_messages(WorldSpec, "simscen: 1\nplaces:\n  ok: {x: 1, y: 2}\n  no/t: {x: 1, y: 2}\n")
     assert expected == [(4, 3, "`no/t` is not a valid name")]
 
 
 def test_a_member_of_a_plain_union_is_reported_once() -> None:
-    expected = _told(RosMapSpec, "image: a\nresolution: 1\norigin: [0, 0, 0]\nnegate: maybe\n")
+    expected = _positions_and_messages(RosMapSpec, "image: a\nresolution: 1\norigin: [0, 0, 0]\nnegate: maybe\n")
     assert len(expected) == 1
     assert expected[0][:2] == (4, 9)
 
@@ -128,7 +132,7 @@ def test_null_values_are_refused() -> None:
 
 
 def test_unsupported_version_is_the_only_reported_problem() -> None:
-    assert _told(ScenarioSpec, "simscen: 2\nnonsense: 1\n") == [
+    assert _positions_and_messages(ScenarioSpec, "simscen: 2\nnonsense: 1\n") == [
         (1, 10, "written for language version 2; this simscen supports 1")
     ]
 
@@ -141,11 +145,13 @@ def test_a_number_in_quotes_is_no_choice() -> None:
 def test_a_tuple_is_called_a_list() -> None:
     estimate = "robot: {pose: {x: 1, y: 1}, initial_estimate: {x: 1, y: 1, std: 0.5}}\n"
     text = "".join(estimate if line.startswith("robot") else line for line in SCENARIO.splitlines(keepends=True))
-    assert [message for *_, message in _told(ScenarioSpec, text)] == ["expected a list, got the number 0.5"]
+    assert [message for *_, message in _positions_and_messages(ScenarioSpec, text)] == [
+        "expected a list, got the number 0.5"
+    ]
 
 
 def test_control_characters_by_escape_are_refused_in_names() -> None:
-    expected = _told(ScenarioSpec, SCENARIO + 'name: "\\x1b[31mred"\n')
+    expected = _positions_and_messages(ScenarioSpec, SCENARIO + 'name: "\\x1b[31mred"\n')
     assert expected == [(5, 7, "control character U+001B in `\\x1b[31mred`")]
 
 
@@ -158,4 +164,4 @@ def test_a_choice_without_a_key_lists_the_keys() -> None:
 def test_a_bare_value_is_as_strict_as_any_other() -> None:
     for written in ("true", "'5'", ".nan", "-1 s", "3 m"):
         text = SCENARIO + f"events: [{{when: {{time: {written}}}, do: {{cancel_goal: {{}}}}}}]\n"
-        assert [(line, col) for line, col, _ in _told(ScenarioSpec, text)] == [(5, 24)], written
+        assert [(line, col) for line, col, _ in _positions_and_messages(ScenarioSpec, text)] == [(5, 24)], written

@@ -1,3 +1,5 @@
+"""Tests of external stacks in scenarios."""
+
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any

@@ -15,7 +15,7 @@ Write = Callable[[str, str], Path]
 BASE = "stack: {controller: {desired_linear_vel: 0.3}}\nrobot: {pose: {x: 1, y: 1}}\ngoals: [{pose: desk}]\n"
 
 
-def expanded(variations: str, base: str = BASE) -> list[Variation]:
+def variations_of(variations: str, base: str = BASE) -> list[Variation]:
     tree, problems = parse_yaml(f"{base}variations:\n{variations}", "x")
     assert isinstance(tree, MappingNode)
     assert not problems
@@ -24,7 +24,7 @@ def expanded(variations: str, base: str = BASE) -> list[Variation]:
     return found  # type: ignore[return-value]
 
 
-def wrong(variations: str) -> list[str]:
+def problems_of(variations: str) -> list[str]:
     tree, _ = parse_yaml(f"{BASE}variations:\n{variations}", "x")
     assert isinstance(tree, MappingNode)
     return [
@@ -35,19 +35,21 @@ def wrong(variations: str) -> list[str]:
 
 
 def names(variations: str) -> list[str]:
-    return [one.name for one in expanded(variations)]
+    return [variation.name for variation in variations_of(variations)]
 
 
 def test_a_grid_is_every_combination_and_each_is_called_by_what_differs() -> None:
-    found = expanded("  grid: {robot.pose.x: [1, 2], robot.pose.y: [3, 4 m], stack.type: [reference]}")
-    assert [one.name for one in found] == ["x=1,y=3", "x=1,y=4m", "x=2,y=3", "x=2,y=4m"]
-    assert [(one.tree.plain["robot"]["pose"]["x"], one.tree.plain["robot"]["pose"]["y"]) for one in found] == [
+    found = variations_of("  grid: {robot.pose.x: [1, 2], robot.pose.y: [3, 4 m], stack.type: [reference]}")
+    assert [variation.name for variation in found] == ["x=1,y=3", "x=1,y=4m", "x=2,y=3", "x=2,y=4m"]
+    assert [
+        (variation.tree.plain["robot"]["pose"]["x"], variation.tree.plain["robot"]["pose"]["y"]) for variation in found
+    ] == [
         (1, 3),
         (1, "4 m"),
         (2, 3),
         (2, "4 m"),
     ]
-    assert all("variations" not in one.tree.entries for one in found)
+    assert all("variations" not in variation.tree.entries for variation in found)
 
 
 def test_values_that_are_too_long_for_the_name_of_a_folder_are_numbered() -> None:
@@ -84,22 +86,22 @@ def test_several_kinds_are_combined_and_several_blocks_follow_each_other() -> No
 
 
 def test_no_blocks_are_no_variations() -> None:
-    (only,) = expanded("  []")
+    (only,) = variations_of("  []")
     assert (only.name, "variations" in only.tree.entries) == ("", False)
 
 
 def test_drawn_values_are_those_of_the_tree_where_they_are_chosen() -> None:
-    found = expanded(
+    found = variations_of(
         "  sampled: {count: 3, values: {robot.pose: {choice: [{x: 1, y: 1}, dock]}, robot.pose2: {integer: [1, 9]}}}"
     )
     assert len(found) == 3
-    assert all(one.tree.plain["robot"]["pose"] in ({"x": 1, "y": 1}, "dock") for one in found)
+    assert all(variation.tree.plain["robot"]["pose"] in ({"x": 1, "y": 1}, "dock") for variation in found)
 
 
 def test_items_of_lists_are_called_as_their_paths_call_them() -> None:
     base = BASE.replace("[{pose: desk}]", "[{pose: desk}, {pose: sofa}]")
-    found = expanded("  pairs: {goals.desk.timeout: [1, 2], goals.1.timeout: [3, 4]}", base)
-    assert [one.name for one in found] == ["desk.timeout=1,1.timeout=3", "desk.timeout=2,1.timeout=4"]
+    found = variations_of("  pairs: {goals.desk.timeout: [1, 2], goals.1.timeout: [3, 4]}", base)
+    assert [variation.name for variation in found] == ["desk.timeout=1,1.timeout=3", "desk.timeout=2,1.timeout=4"]
 
 
 @pytest.mark.parametrize(
@@ -146,18 +148,18 @@ def test_derived_names_are_readable_unique_and_safe_as_folders(variations: str, 
     ],
 )  # fmt: skip
 def test_mistakes_in_variations_are_reported_at_their_positions(variations: str, text: str) -> None:
-    assert any(text in found for found in wrong(variations)), wrong(variations)
+    assert any(text in found for found in problems_of(variations)), problems_of(variations)
 
 
 def test_a_thousand_million_combinations_are_refused_without_being_made() -> None:
     grid = ", ".join(f"robot.k{n}: [{', '.join(map(str, range(10)))}]" for n in range(9))
-    assert wrong(f"  grid: {{{grid}}}") == ["5:3 the scenario has 1000000000 variations; the limit is 1000"]
+    assert problems_of(f"  grid: {{{grid}}}") == ["5:3 the scenario has 1000000000 variations; the limit is 1000"]
 
 
 def test_many_variations_of_a_large_value_are_refused_without_being_made() -> None:
     seeds = ", ".join(map(str, range(1, 1000)))
     goals = ", ".join("{pose: desk}" for _ in range(3000))
-    (text,) = wrong(f"  grid: {{seed: [{seeds}], goals: [[{goals}]]}}")
+    (text,) = problems_of(f"  grid: {{seed: [{seeds}], goals: [[{goals}]]}}")
     assert "999 variations of up to 9" in text
     assert text.endswith("values exceed the limit of 5000000 values in total")
 
@@ -169,7 +171,7 @@ def test_each_variation_is_a_whole_scenario_with_its_values(write, scenario: str
     )
     loaded = try_variations(file, file.parent)
     assert isinstance(loaded, tuple)
-    assert [(one.title, one.spec.seed) for one in loaded] == [("a[seed=3]", 3), ("a[seed=4]", 4)]
+    assert [(variation.title, variation.spec.seed) for variation in loaded] == [("a[seed=3]", 3), ("a[seed=4]", 4)]
     assert loaded[0].spec.stack.controller.desired_linear_vel == 0.2  # type: ignore[union-attr]
     assert loaded[0].world is loaded[1].world
     assert load_scenario(file, file.parent, variation="seed=4").spec.seed == 4
@@ -178,18 +180,18 @@ def test_each_variation_is_a_whole_scenario_with_its_values(write, scenario: str
 def test_a_file_that_is_extended_may_hold_the_variations(write, scenario: str) -> None:
     write("base.yaml", scenario + "variations: {grid: {seed: [3, 4]}}\n")
     file = write("a.scenario.yaml", "extends: base.yaml\n")
-    assert [one.variation for one in try_variations(file, Path(file).parent)] == ["seed=3", "seed=4"]  # type: ignore[union-attr]
+    assert [variation.variation for variation in try_variations(file, Path(file).parent)] == ["seed=3", "seed=4"]  # type: ignore[union-attr]
     file = write("b.scenario.yaml", "extends: base.yaml\nvariations: []\n")
-    assert [one.variation for one in try_variations(file, Path(file).parent)] == [""]  # type: ignore[union-attr]
+    assert [variation.variation for variation in try_variations(file, Path(file).parent)] == [""]  # type: ignore[union-attr]
 
 
 def test_conditions_that_exclude_all_pairs_are_an_error() -> None:
     block = "  pairwise: {robot.pose.x: [1, 2], robot.pose.y: [3, 4]}\n  require: [robot.pose.x > 5]"
-    assert wrong(block) == ["6:12 no variation meets the conditions"]
+    assert problems_of(block) == ["6:12 no variation meets the conditions"]
 
 
 def test_the_name_of_a_numbered_variation_is_reserved() -> None:
-    assert wrong("  list: [{name: variation-2, tags: [a]}, {tags: [b]}]") == [
+    assert problems_of("  list: [{name: variation-2, tags: [a]}, {tags: [b]}]") == [
         "5:17 `variation-2` is reserved for the variation with this number"
     ]
 
@@ -212,13 +214,13 @@ def test_a_number_without_a_variation_is_not_a_file_without_variations(write: Wr
 )
 def test_a_condition_uses_the_new_value_however_its_path_is_written(varied: str, condition: str) -> None:
     base = "robot: {}\ngoals: [{name: dock, pose: {x: 1}}]\nfaults: [{sensor: lidar, for: 3 s}]\n"
-    (only,) = expanded(f'  grid:\n    {varied}\n  require: ["{condition}"]', base)
+    (only,) = variations_of(f'  grid:\n    {varied}\n  require: ["{condition}"]', base)
     assert only.changes[0].number == 2
 
 
 def test_conditions_on_other_axes_leave_out_no_pairs() -> None:
     block = "  pairwise: {robot.pose.x: [1, 2], robot.pose.y: [3, 4]}\n  pairs: {robot.pose.yaw: [1, 5]}\n"
     base = BASE.replace("y: 1", "y: 1, yaw: 0")
-    assert len(expanded(f"{block}  require: [robot.pose.yaw > robot.pose.y]", base)) == 4
+    assert len(variations_of(f"{block}  require: [robot.pose.yaw > robot.pose.y]", base)) == 4
     with_other_path = block.replace("robot.pose.yaw:", "'robot[\"pose\"].yaw':")
-    assert len(expanded(f"{with_other_path}  require: [robot.pose.yaw > robot.pose.y]", base)) == 4
+    assert len(variations_of(f"{with_other_path}  require: [robot.pose.yaw > robot.pose.y]", base)) == 4

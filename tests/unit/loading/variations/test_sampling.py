@@ -14,8 +14,8 @@ def draw_values(sampled: Sampled, path: str) -> list[Any]:
     return [quantile(sampled.values[path], probability(sampled, path, index)) for index in range(sampled.count)]
 
 
-def sampled(draw: dict[str, Any], count: int = 400, **more: Any) -> list[Any]:
-    return draw_values(Sampled.model_validate({"count": count, "values": {"x": draw}, **more}), "x")
+def sampled(draw: dict[str, Any], count: int = 400, **options: Any) -> list[Any]:
+    return draw_values(Sampled.model_validate({"count": count, "values": {"x": draw}, **options}), "x")
 
 
 def test_more_draws_or_another_path_change_none_that_were_there() -> None:

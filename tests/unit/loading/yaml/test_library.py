@@ -1,3 +1,5 @@
+"""Tests of `extends`, default values, and the merging of files."""
+
 from pathlib import Path
 from typing import Any
 

@@ -1,3 +1,5 @@
+"""Tests of the YAML parser: positions, problems, and limits."""
+
 import resource
 
 import pytest
@@ -20,7 +22,7 @@ def _problem(text: str) -> Problem:
     return problems[0]
 
 
-def test_keeps_the_place_of_every_key_and_value() -> None:
+def test_every_key_and_value_has_its_position() -> None:
     tree = _tree("a: 1\nb:\n  - x: y\n    z: {u: v}\n")
     assert key_position(tree, ("b", 0, "z", "u"))[1:] == (4, 9)
     assert value_position(tree, ("b", 0, "z", "u"))[1:] == (4, 12)
@@ -50,7 +52,7 @@ def test_anchors_and_merge_keys_work() -> None:
     assert _tree(text).plain["same"] == {"x": 1, "y": 2}  # type: ignore[index]
 
 
-def test_merged_keys_keep_the_place_they_were_written_at() -> None:
+def test_merged_keys_keep_their_positions() -> None:
     tree = _tree("base: &base {x: 1}\nmade: {<<: *base, y: 2}\n")
     assert key_position(tree, ("made", "x"))[1:] == (1, 14)
 
@@ -73,7 +75,7 @@ def test_deep_nesting_is_refused(opening: str, output: str) -> None:
     assert _problem(opening * 200_000).message == output
 
 
-def test_forty_levels_are_fine() -> None:
+def test_forty_levels_are_valid() -> None:
     _tree("[" * MAX_DEPTH + "]" * MAX_DEPTH)
 
 

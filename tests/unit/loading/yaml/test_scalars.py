@@ -1,3 +1,5 @@
+"""Tests of the types of YAML scalars."""
+
 import math
 
 import pytest

@@ -1,3 +1,5 @@
+"""Tests of reading text files, and of files that are refused."""
+
 import os
 import signal
 import socket
@@ -16,13 +18,13 @@ def _problem(path: Path) -> Problem:
     return read
 
 
-def _written(path: Path, raw: bytes) -> Path:
+def _file_with(path: Path, raw: bytes) -> Path:
     path.write_bytes(raw)
     return path
 
 
 def test_reads_utf8_with_every_kind_of_line_break_and_a_byte_order_mark(tmp_path: Path) -> None:
-    file = _written(tmp_path / "a.yaml", b"\xef\xbb\xbfa: \xc3\xa9\r\nb: 1\rc: 2\n")
+    file = _file_with(tmp_path / "a.yaml", b"\xef\xbb\xbfa: \xc3\xa9\r\nb: 1\rc: 2\n")
     assert read_text(file, "a.yaml") == "a: é\nb: 1\nc: 2\n"
 
 
@@ -31,7 +33,7 @@ def test_a_missing_file_is_reported(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("kind", ["folder", "fifo", "device", "socket"])
-def test_refuses_what_is_not_a_regular_file_without_waiting_for_it(tmp_path: Path, kind: str) -> None:
+def test_special_files_are_refused_without_waiting_for_data(tmp_path: Path, kind: str) -> None:
     path = tmp_path / "x.yaml"
     if kind == "folder":
         path.mkdir()
@@ -41,7 +43,7 @@ def test_refuses_what_is_not_a_regular_file_without_waiting_for_it(tmp_path: Pat
         path = Path("/dev/zero")
     else:
         socket.socket(socket.AF_UNIX).bind(str(path))
-    signal.signal(signal.SIGALRM, _waits)
+    signal.signal(signal.SIGALRM, _fail_after_timeout)
     signal.alarm(30)
     try:
         assert _problem(path).message == "not a regular file"
@@ -49,7 +51,7 @@ def test_refuses_what_is_not_a_regular_file_without_waiting_for_it(tmp_path: Pat
         signal.alarm(0)
 
 
-def _waits(*_) -> None:
+def _fail_after_timeout(*_) -> None:
     raise AssertionError("it waits for somebody who writes")
 
 
@@ -58,7 +60,7 @@ def _waits(*_) -> None:
 )
 def test_image_is_recognized_and_refused(tmp_path: Path, start: bytes) -> None:
     hint = "an image, not a text; if it is the image of a map, name the YAML file of the map"
-    assert _problem(_written(tmp_path / "map.pgm", start + bytes(2 << 20))).message == hint
+    assert _problem(_file_with(tmp_path / "map.pgm", start + bytes(2 << 20))).message == hint
 
 
 def test_refuses_a_huge_file_without_reading_it_all(tmp_path: Path) -> None:
@@ -69,12 +71,12 @@ def test_refuses_a_huge_file_without_reading_it_all(tmp_path: Path) -> None:
 
 
 def test_a_file_of_exactly_one_mebibyte_is_read(tmp_path: Path) -> None:
-    assert isinstance(read_text(_written(tmp_path / "full.yaml", b"#" * (1 << 20)), "full.yaml"), str)
+    assert isinstance(read_text(_file_with(tmp_path / "full.yaml", b"#" * (1 << 20)), "full.yaml"), str)
 
 
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may read everything")
 def test_unreadable_file_is_reported(tmp_path: Path) -> None:
-    path = _written(tmp_path / "secret.yaml", b"a: 1")
+    path = _file_with(tmp_path / "secret.yaml", b"a: 1")
     path.chmod(0)
     assert _problem(path).message == "permission denied"
 
@@ -86,18 +88,18 @@ def test_a_loop_of_symbolic_links_is_reported(tmp_path: Path) -> None:
 
 
 def test_a_byte_that_is_not_utf8_is_reported_with_its_position(tmp_path: Path) -> None:
-    problem = _problem(_written(tmp_path / "latin1.yaml", b"a: 1\nname: caf" + b"\xe9\n"))
+    problem = _problem(_file_with(tmp_path / "latin1.yaml", b"a: 1\nname: caf" + b"\xe9\n"))
     assert (problem.line, problem.col, problem.message) == (2, 10, "not valid UTF-8 at byte 14")
 
 
 def test_utf16_is_recognized(tmp_path: Path) -> None:
-    problem = _problem(_written(tmp_path / "utf16.yaml", "a: 1".encode("utf-16")))
+    problem = _problem(_file_with(tmp_path / "utf16.yaml", "a: 1".encode("utf-16")))
     assert "not valid UTF-8" in problem.message
     assert "UTF-16" in problem.hint
 
 
 @pytest.mark.parametrize("character", ["\x00", "\x1b", "\x07", "\x7f", "\x85", "\u2028", "\u202e", "\u2066", "\ufffe"])
 def test_raw_control_characters_are_refused_at_their_place(tmp_path: Path, character: str) -> None:
-    problem = _problem(_written(tmp_path / "c.yaml", f"a: 1\nb: x{character}y\n".encode()))
+    problem = _problem(_file_with(tmp_path / "c.yaml", f"a: 1\nb: x{character}y\n".encode()))
     assert (problem.line, problem.col) == (2, 5)
     assert problem.message == f"control character U+{ord(character):04X}"
