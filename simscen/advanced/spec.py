@@ -54,7 +54,7 @@ class ScanMatchingAmcl(AmclParameters):
     `random`: by random particles, which `recovery_alpha_*` adds as in Nav2. `scan_matching` ignores
     `recovery_alpha_*`, because random particles at a similar place would draw the filter away from a correct pose."""
     sure_update_interval: Annotated[int, Field(ge=1, le=10)] = 2
-    """While map, scan matching and odometry agree, only every n-th scan is compared with the map. The others are only
+    """While map, scan matching, and odometry agree, only every n-th scan is compared with the map. The others are only
     matched with earlier scans. With `covariance: scatter`, every scan is compared with the map."""
     covariance: Literal["particles", "scatter"] = "particles"
     """Covariance of the pose. `particles`: the covariance of the particles, as in Nav2. `scatter`: this covariance,
