@@ -12,7 +12,7 @@ stack: {controller: {desired_linear_vel: 0.3}}
 """
 
 
-def expected(write, text: str, name: str = "a.base.yaml") -> list[str]:
+def problems_of(write, text: str, name: str = "a.base.yaml") -> list[str]:
     file = write(name, text)
     assert file_kind(file, file.parent) == "base"
     return [f"{found.line}:{found.col} {found.message}" for found in check_file("base", file, file.parent)]
@@ -20,11 +20,11 @@ def expected(write, text: str, name: str = "a.base.yaml") -> list[str]:
 
 @pytest.mark.parametrize("name", ["a.base.yaml", "a.base.yml", "defaults.yaml", "deep/defaults.yaml"])
 def test_base_can_omit_required_keys(write, name: str) -> None:
-    assert expected(write, "tags: [smoke]\n", name) == []
+    assert problems_of(write, "tags: [smoke]\n", name) == []
 
 
 def test_a_base_may_say_a_part_of_a_mapping(write) -> None:
-    assert expected(write, BASE) == []
+    assert problems_of(write, BASE) == []
 
 
 @pytest.mark.parametrize(
@@ -51,17 +51,17 @@ def test_a_base_may_say_a_part_of_a_mapping(write) -> None:
     ],
 )
 def test_content_of_a_base_is_checked(write, text: str, problem: str) -> None:
-    found = expected(write, text)
-    assert [one for one in found if problem in one], found
+    found = problems_of(write, text)
+    assert [message for message in found if problem in message], found
 
 
 def test_list_additions_of_a_base_are_checked(write) -> None:
-    assert expected(write, "pass+: [{collisions: {max: 0}}]\n") == []
-    assert expected(write, "pass+: [{colisions: {max: 0}}]\n")[0].startswith("1:10 unknown key `colisions`")
+    assert problems_of(write, "pass+: [{collisions: {max: 0}}]\n") == []
+    assert problems_of(write, "pass+: [{colisions: {max: 0}}]\n")[0].startswith("1:10 unknown key `colisions`")
 
 
 def test_a_base_may_extend_another(write) -> None:
     write("b.base.yaml", "linger: 1\n")
-    assert expected(write, "extends: b.base.yaml\n") == []
+    assert problems_of(write, "extends: b.base.yaml\n") == []
     write("b.base.yaml", "linger: no\n")
-    assert expected(write, "extends: b.base.yaml\n") == ["1:9 expected a duration, got the text `no`"]
+    assert problems_of(write, "extends: b.base.yaml\n") == ["1:9 expected a duration, got the text `no`"]

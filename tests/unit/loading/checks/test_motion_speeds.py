@@ -24,7 +24,7 @@ pass: [{{goals_reached: {{}}}}]
 TURN = "keyframes: [[0, 6, 2, 0], [{}, 6, 2, 90 deg]]"
 
 
-def too_fast(tmp_path, world="", event="cancel_goal: {}", rate=240):
+def speed_problems(tmp_path, world="", event="cancel_goal: {}", rate=240):
     file = tmp_path / "a.scenario.yaml"
     file.write_text(SCENARIO.format(world=world, event=event, rate=rate))
     return [(p.line, p.hint) for p in check_in_world(load_scenario(file, tmp_path)) if p.code == "SC305"]
@@ -37,17 +37,19 @@ def test_a_turn_within_few_ticks_is_an_error(tmp_path, name, seconds):
     event = f"move: {{name: {name}, {TURN.format(seconds)}}}"
     if name == "door":
         event = f"open: {{name: door, duration: {seconds}}}"
-    (found,) = too_fast(tmp_path, event=event)
+    (found,) = speed_problems(tmp_path, event=event)
     assert found[0] == 13
     assert found[1].startswith("make it ")
-    assert not too_fast(tmp_path, event=event.replace(str(seconds), "1.5"))
+    assert not speed_problems(tmp_path, event=event.replace(str(seconds), "1.5"))
 
 
 def test_motions_of_the_world_file_are_checked_at_its_line(tmp_path):
-    assert [line for line, _ in too_fast(tmp_path, world=f", move: {{{TURN.format(0.004)}}}")] == [7]
+    assert [line for line, _ in speed_problems(tmp_path, world=f", move: {{{TURN.format(0.004)}}}")] == [7]
 
 
 def test_speed_limit_of_scripted_objects_is_a_distance_per_tick(tmp_path):
     event = "move: {name: arm, through: [[6, 4]], speed: 20}"
-    assert not too_fast(tmp_path, event=event)
-    assert too_fast(tmp_path, event=event, rate=120) == [(13, "make it 1.7 times slower, or raise `physics.tick_rate`")]
+    assert not speed_problems(tmp_path, event=event)
+    assert speed_problems(tmp_path, event=event, rate=120) == [
+        (13, "make it 1.7 times slower, or raise `physics.tick_rate`")
+    ]

@@ -26,7 +26,7 @@ IN_THE_CRATE = ['goal `crate` (4, 4) is inside obstacle "crate"']
 AT_START = 'the robot\'s start (4, 4) is inside obstacle "crate"'
 
 
-def expected(tmp_path: Path, criteria: str, start: float = 1, events: str = "") -> list[str]:
+def messages_of(tmp_path: Path, criteria: str, start: float = 1, events: str = "") -> list[str]:
     file = tmp_path / "a.scenario.yaml"
     file.write_text(SCENARIO.format(criteria=criteria, start=start, events=events))
     return [problem.message for problem in check_in_world(load_scenario(file, tmp_path))]
@@ -46,7 +46,7 @@ def expected(tmp_path: Path, criteria: str, start: float = 1, events: str = "") 
     ],
 )
 def test_goal_that_is_expected_to_fail_may_be_occupied(tmp_path, criterion):
-    assert expected(tmp_path, f"{{{criterion}}}") == []
+    assert messages_of(tmp_path, f"{{{criterion}}}") == []
 
 
 @pytest.mark.parametrize(
@@ -63,24 +63,24 @@ def test_goal_that_is_expected_to_fail_may_be_occupied(tmp_path, criterion):
 )
 def test_goal_that_is_not_expected_to_fail_must_be_free(tmp_path, criterion):
     canceled = "events: [{when: {time: 1}, do: {cancel_goal: {}}}]" if "CANCELED" in criterion else ""
-    assert expected(tmp_path, f"{{{criterion}}}", events=canceled) == IN_THE_CRATE
+    assert messages_of(tmp_path, f"{{{criterion}}}", events=canceled) == IN_THE_CRATE
 
 
 @pytest.mark.parametrize("code", ["START_OCCUPIED", "START_OUTSIDE_MAP"])
 def test_a_bad_start_may_be_asked_for_by_its_code_alone(tmp_path, code):
-    assert expected(tmp_path, f"{{error_code: {{code: {code}}}}}", start=4) == []
-    assert expected(tmp_path, f"{{result: {{status: FAILED, error_code: {code}}}}}", start=4) == []
-    assert expected(tmp_path, "{error_code: {code: GOAL_OCCUPIED}}", start=4) == [AT_START]
+    assert messages_of(tmp_path, f"{{error_code: {{code: {code}}}}}", start=4) == []
+    assert messages_of(tmp_path, f"{{result: {{status: FAILED, error_code: {code}}}}}", start=4) == []
+    assert messages_of(tmp_path, "{error_code: {code: GOAL_OCCUPIED}}", start=4) == [AT_START]
 
 
 @pytest.mark.parametrize("do", ["{{new_goal: {}}}", "[{{cancel_goal: {{}}}}, {{new_goal: {}}}]"])
 def test_goals_of_events_are_checked(tmp_path, do):
     sent = do.format("{name: detour, pose: {x: 4, y: 4}}")
     events = f"events: [{{when: {{time: 1}}, do: {sent}}}]"
-    assert expected(tmp_path, "{error_code: {code: NO_VALID_PATH, goal: crate}}", events=events) == [
+    assert messages_of(tmp_path, "{error_code: {code: NO_VALID_PATH, goal: crate}}", events=events) == [
         'goal `detour` (4, 4) is inside obstacle "crate"'
     ]
-    assert expected(tmp_path, "{error_code: {code: NO_VALID_PATH}}", events=events) == []
+    assert messages_of(tmp_path, "{error_code: {code: NO_VALID_PATH}}", events=events) == []
 
 
 @pytest.mark.parametrize(("x", "code"), [(4, "GOAL_OCCUPIED"), (40, "GOAL_OUTSIDE_MAP")])

@@ -17,27 +17,27 @@ ZONES = "stack: {keepout: [hall], speed_zones: [{region: hall, speed_limit: 0.2}
 
 
 @pytest.fixture
-def chosen(write, scenario, tmp_path: Path):
-    """The scenario with `own` lines of its own, run with the stack file of that text."""
+def load_with_stack_file(write, scenario, tmp_path: Path):
+    """Return a function that loads the scenario with additional lines and with a stack file."""
 
-    def load(own: str, text: str, name: str = "mine.stack.yaml"):
-        choice = load_stack_file("mine", name, write(name, text), tmp_path)
-        return load_scenario(write("a.scenario.yaml", scenario + own), tmp_path, (), choice)
+    def load(lines: str, stack_file: str, name: str = "mine.stack.yaml"):
+        choice = load_stack_file("mine", name, write(name, stack_file), tmp_path)
+        return load_scenario(write("a.scenario.yaml", scenario + lines), tmp_path, (), choice)
 
     return load
 
 
-def test_zones_and_masks_are_the_scenarios_and_parameters_the_stack_files(chosen) -> None:
-    loaded = chosen(ZONES, "simscen: 1\nstack: {controller: {type: dwb}}\n")
+def test_zones_are_from_the_scenario_and_parameters_from_the_stack_file(load_with_stack_file) -> None:
+    loaded = load_with_stack_file(ZONES, "simscen: 1\nstack: {controller: {type: dwb}}\n")
     stack = loaded.spec.stack
     assert stack.controller.type == "dwb"
     assert stack.keepout == ["hall"]
     assert stack.speed_zones[0].speed_limit == 0.2
-    assert stack.costmap.inflation_radius == 0.70  # a file is the whole stack, not a patch on each scenario's own
+    assert stack.costmap.inflation_radius == 0.70  # the stack file replaces all parameters of the scenario
 
 
-def test_the_log_keeps_the_scenario_as_it_ran(chosen) -> None:
-    loaded = chosen(ZONES, "simscen: 1\nstack: {controller: {type: dwb}}\n")
+def test_the_log_keeps_the_scenario_as_it_ran(load_with_stack_file) -> None:
+    loaded = load_with_stack_file(ZONES, "simscen: 1\nstack: {controller: {type: dwb}}\n")
     assert resolve_places(spec_of_text(resolved_text(loaded), "log"), loaded.world.spec.places) == loaded.spec
     assert loaded.text != resolved_text(loaded)
 
@@ -49,9 +49,9 @@ def test_the_reference_stack_keeps_the_parameters_that_the_scenario_gives_it(wri
     assert resolved_text(loaded) == file.read_text()
 
 
-def test_a_mistake_in_a_stack_file_is_reported_at_its_position(chosen, tmp_path: Path) -> None:
+def test_a_mistake_in_a_stack_file_is_reported_at_its_position(load_with_stack_file, tmp_path: Path) -> None:
     with pytest.raises(InvalidInput) as expected:
-        chosen("", "simscen: 1\nstack:\n  controler: {type: dwb}\n  keepout: [hall]\n")
+        load_with_stack_file("", "simscen: 1\nstack:\n  controler: {type: dwb}\n  keepout: [hall]\n")
     found = [(p.path, p.line, p.col, p.code, p.source) for p in expected.value.problems]
     assert found == [
         ("mine.stack.yaml", 3, 3, "SC012", "  controler: {type: dwb}"),
@@ -59,10 +59,10 @@ def test_a_mistake_in_a_stack_file_is_reported_at_its_position(chosen, tmp_path:
     ]
 
 
-def test_scenario_dependent_mistake_is_reported_in_the_stack_file(chosen) -> None:
+def test_scenario_dependent_mistake_is_reported_in_the_stack_file(load_with_stack_file) -> None:
     """240 Hz of physics is not 7 times anything."""
     with pytest.raises(InvalidInput) as expected:
-        chosen("", "simscen: 1\nstack:\n  controller_frequency: 7 Hz\n")
+        load_with_stack_file("", "simscen: 1\nstack:\n  controller_frequency: 7 Hz\n")
     (problem,) = expected.value.problems
     assert (problem.path, problem.line, problem.code) == ("mine.stack.yaml", 3, "SC034")
     assert problem.source == "  controller_frequency: 7 Hz"
