@@ -1,4 +1,4 @@
-"""The planner: ends that fit, a search, and poses along what it found."""
+"""The planner: finds free start and goal cells, searches a path, and returns its poses."""
 
 import math
 from itertools import pairwise

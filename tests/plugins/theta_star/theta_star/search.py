@@ -1,4 +1,4 @@
-"""Lazy Theta*: a cell's parent is taken to be in sight until the cell is expanded, and only then looked at."""
+"""Lazy Theta*: any-angle path search that checks the line of sight to the parent when a cell is expanded."""
 
 import heapq
 import math

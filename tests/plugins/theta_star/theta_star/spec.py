@@ -1,4 +1,4 @@
-"""What a scenario may say of the planner. No engine is imported here: validating a file stays light."""
+"""Parameters of the planner in a scenario. Imports no engine, so that validation stays fast."""
 
 from typing import ClassVar
 

@@ -1,4 +1,4 @@
-"""What the lidars have seen lately, in cells of the map frame."""
+"""Obstacles that the lidars have detected recently, as cells in the map frame."""
 
 import numpy as np
 

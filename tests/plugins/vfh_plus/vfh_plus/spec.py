@@ -1,4 +1,4 @@
-"""What a scenario may say of the stack."""
+"""Parameters of the stack in a scenario."""
 
 from typing import ClassVar
 

@@ -1,4 +1,4 @@
-"""The stack: readings in, one command out, each beat."""
+"""The stack: converts the readings of each beat to a velocity command."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Where to go on a map: Dijkstra's distances to the goal, and the way downhill."""
+"""Wavefront planner: Dijkstra distances to the goal on a map, and the direction of steepest descent."""
 
 import heapq
 import math

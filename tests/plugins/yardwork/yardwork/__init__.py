@@ -1,1 +1,1 @@
-"""Types for simscen as another maker would ship them."""
+"""Example package with types for simscen."""

@@ -1,4 +1,4 @@
-"""`crosstalk`: the beams of somebody else's lidar."""
+"""`crosstalk`: false returns caused by another lidar."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""`dwell`: how long the robot stays in a region in one go."""
+"""`dwell`: the longest uninterrupted stay of the robot in a region."""
 
 from __future__ import annotations
 

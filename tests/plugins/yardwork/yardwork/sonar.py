@@ -1,4 +1,4 @@
-"""`sonar`: what a ring of ultrasonic sensors is, without what it takes to simulate one."""
+"""`sonar`: parameters of a ring of ultrasonic sensors, without the simulation."""
 
 from typing import Annotated, ClassVar
 

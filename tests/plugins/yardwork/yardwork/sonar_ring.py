@@ -1,4 +1,4 @@
-"""Ultrasonic sensors, simulated: the nearest of a fan of rays in each cone."""
+"""Simulated ring of ultrasonic sensors: each measures the nearest hit of a fan of rays in its cone."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""`turn_robot`: somebody turns the robot around."""
+"""`turn_robot`: action that turns the robot in place."""
 
 from simscen.plugin import Action, Angle, Effect, Pose2, Spec, Stage
 
