@@ -1,4 +1,4 @@
-"""Frames from simscen that violate the protocol."""
+"""Tests that the peer refuses frames of simscen that violate the stack protocol."""
 
 import socket
 from collections.abc import Callable
@@ -13,7 +13,7 @@ HELLO = {"protocols": [1], "robot": {}, "says": [], "hears": []}
 
 
 def receive(*frames: bytes) -> None:
-    """Let a stack receive these frames, up to the second step."""
+    """Let a peer receive these frames until the connection ends or a frame is malformed."""
     ours, theirs = socket.socketpair()
     with ours, theirs:
         ours.sendall(b"".join(frames))

@@ -1,4 +1,4 @@
-"""Tests that the messages of the peer client equal those of the log."""
+"""Tests that the peer writes the same messages as simscen's log, and reads messages of simscen."""
 
 import contextlib
 import struct
@@ -36,7 +36,7 @@ def test_path_equals_the_message_of_the_engine(points) -> None:
     assert ours[:24] == theirs[:24]
     assert np.allclose(
         path(MessageReader(ours)).poses, path(MessageReader(theirs)).poses, rtol=1e-15, atol=1e-15
-    )  # numpy's sine is not libm's
+    )  # the sine of numpy and of the C library may differ in the last bit
 
 
 @given(numbers, numbers, st.floats(-4, 4), st.lists(numbers, min_size=9, max_size=9))
@@ -86,8 +86,8 @@ def test_imu_picture_and_map_are_unchanged_by_serialization() -> None:
     assert read.angular_velocity_covariance == (0.25, 0.0, 0.0, 0.0, 0.25, 0.0, 0.0, 0.0, 0.25)
     assert read.linear_acceleration_covariance == (0.5, 0.0, 0.0, 0.0, 0.5, 0.0, 0.0, 0.0, 0.5)
     picture = np.arange(24, dtype=np.uint8).reshape(2, 4, 3)
-    seen = messages.read("sensor_msgs/msg/Image", encode.image("eye", STAMP, picture))
-    assert (seen.height, seen.width, seen.encoding, seen.step, seen.data) == (2, 4, "rgb8", 12, picture.tobytes())
+    image = messages.read("sensor_msgs/msg/Image", encode.image("eye", STAMP, picture))
+    assert (image.height, image.width, image.encoding, image.step, image.data) == (2, 4, "rgb8", 12, picture.tobytes())
     grid = OccupancyGrid(np.array([[0, 100, -1], [1, 2, 3]], dtype=np.int8), 0.5, Pose2(1.0, 2.0, 0.5))
     cells = messages.read("nav_msgs/msg/OccupancyGrid", encode.occupancy_grid("map", STAMP, grid))
     assert (cells.width, cells.height, list(cells.data), cells.resolution) == (3, 2, [0, 100, -1, 1, 2, 3], 0.5)

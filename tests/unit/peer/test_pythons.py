@@ -1,4 +1,4 @@
-"""The client runs on every Python from 3.8 on, with nothing but the standard library."""
+"""Tests that the peer runs with Python 3.8 and later, and needs only the standard library."""
 
 import ast
 import os
@@ -14,7 +14,7 @@ from simscen import peer
 FOLDER = Path(peer.__file__).parent
 FILES = sorted(FOLDER.rglob("*.py"))
 VERSIONS = ["3.8", "3.9", "3.10", "3.11", "3.12", "3.13"]
-EVERYTHING = """\
+PROGRAM = """\
 import os, socket, sys, threading
 sys.path.append(os.environ["SIMSCEN_PEER_PATH"])
 from simscen_peer import Connection, Peer, messages, wire
@@ -53,7 +53,7 @@ while True:
 print(kinds)
 engine.close()
 """
-SAID = """\
+EXPECTED_OUTPUT = """\
 [(12, (0, 50000000), True, 'a', False), (24, (0, 100000000), None, None, True)]
 ['WELCOME', 'ANSWER', [3, 1, 2], 'ANSWER', [3, 1, 2], 'BYE']
 """
@@ -78,7 +78,7 @@ def test_peer_imports_only_the_standard_library() -> None:
 
 
 def pythons(version: str) -> list[str]:
-    """The interpreters of that version on this machine."""
+    """Return the paths of the interpreters of this version on this machine."""
     folders = [Path.home() / ".pyenv/versions", Path.home() / ".local/share/uv/python"]
     found = [str(path) for folder in folders for path in folder.glob(f"*{version}.*/bin/python3")]
     return [*filter(None, [shutil.which(f"python{version}")]), *found]
@@ -87,12 +87,12 @@ def pythons(version: str) -> list[str]:
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("version", VERSIONS)
 def test_peer_client_works_on_this_python(version: str, tmp_path: Path) -> None:
-    (tmp_path / "a.py").write_text(EVERYTHING)
+    (tmp_path / "a.py").write_text(PROGRAM)
     env = {"SIMSCEN_PEER_PATH": str(FOLDER / "standalone"), "HOME": os.environ.get("HOME", "/")}
     for python in pythons(version):
         command = [python, "-I", "-S", "-W", "error", str(tmp_path / "a.py")]
-        ended = subprocess.run(command, env=env, capture_output=True, text=True, check=False)
-        if "No module named" not in ended.stderr and "command not found" not in ended.stderr:
-            assert (ended.stdout, ended.stderr) == (SAID, "")
+        completed = subprocess.run(command, env=env, capture_output=True, text=True, check=False)
+        if "No module named" not in completed.stderr and "command not found" not in completed.stderr:
+            assert (completed.stdout, completed.stderr) == (EXPECTED_OUTPUT, "")
             return
     pytest.skip(f"there is no Python {version} on this machine")

@@ -1,4 +1,4 @@
-"""Feedback of Nav2's navigation actions, with a fake rclpy."""
+"""Tests of the feedback of Nav2's navigation actions, with a fake rclpy."""
 
 import importlib.util
 import sys
@@ -25,7 +25,7 @@ def module(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     monkeypatch.setattr(found, "find_type", lambda _: MagicMock())
     monkeypatch.setattr(found, "ActionClient", MagicMock())
     yield found
-    for name in sorted(set(sys.modules) - before):  # they refer to the fake
+    for name in sorted(set(sys.modules) - before):  # these modules refer to the fake rclpy
         if name.startswith("simscen.ros2."):
             del sys.modules[name]
 
@@ -37,7 +37,7 @@ def feedback(remaining: int, recoveries: int) -> Any:
 
 
 def test_late_feedback_on_earlier_goals_is_ignored(module: Any) -> None:
-    """It would report goals as reached and recoveries that the current goals never had."""
+    """Otherwise, simscen would record goals and recoveries of the earlier goals for the current goals."""
     sender = module.ActionSender(MagicMock(offset_ns=0), "navigate_through_poses")
     handle = sender._client.send_goal_async.return_value.result.return_value
     handle.get_result_async.return_value.done.return_value = False

@@ -1,4 +1,4 @@
-"""Bring-up before a run, with a fake rclpy and graph."""
+"""Tests of the bring-up before a run, with a fake rclpy and a fake graph."""
 
 import importlib
 import sys
@@ -37,7 +37,7 @@ def module(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
         for name in ("rclpy", "rclpy.action", "rclpy.clock", "rclpy.executors", "rclpy.qos", "rclpy.serialization"):
             monkeypatch.setitem(sys.modules, name, MagicMock())
     yield importlib.import_module("simscen.ros2.bring_up")
-    for name in sorted(set(sys.modules) - before):  # they refer to the fake
+    for name in sorted(set(sys.modules) - before):  # these modules refer to the fake rclpy
         if name.startswith("simscen.ros2."):
             del sys.modules[name]
 

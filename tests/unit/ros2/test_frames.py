@@ -1,4 +1,4 @@
-"""Frames in the user's graph: their names, and the order in which transforms are published."""
+"""Tests of frame names in the user's ROS graph, and of the order in which transforms are published."""
 
 from simscen.ros2.graph_names import FrameNames
 from simscen.ros2.messages import transforms_first
@@ -16,6 +16,6 @@ def test_the_base_frame_has_its_own_and_a_second_name() -> None:
     assert FrameNames(["base_link:=base_footprint"], "base_footprint").base_frames == ["base_footprint"]
 
 
-def test_a_message_without_renamed_frames_is_not_touched() -> None:
+def test_a_message_without_renamed_frames_is_unchanged() -> None:
     data = b"bytes that are no message"
     assert FrameNames(["lidar:=base_scan"], "base_footprint").apply("/odom", None, data) is data

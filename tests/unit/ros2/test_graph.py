@@ -1,4 +1,4 @@
-"""simscen's node in the graph, with a fake rclpy."""
+"""Test of simscen's node in the ROS graph, with a fake rclpy."""
 
 import importlib
 import sys
@@ -40,7 +40,7 @@ def graph(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
     monkeypatch.setitem(sys.modules, "rclpy.executors", executors)
     monkeypatch.delitem(sys.modules, "simscen.ros2.graph", raising=False)
     yield importlib.import_module("simscen.ros2.graph").Graph(SimpleNamespace(namespace=""), lambda: None)
-    del sys.modules["simscen.ros2.graph"]  # refers to the fake
+    del sys.modules["simscen.ros2.graph"]  # refers to the fake rclpy
 
 
 def test_all_messages_are_received_although_other_events_come_first(graph: Any) -> None:

@@ -1,4 +1,4 @@
-"""Tests of which Nav2 server must send a command."""
+"""Tests of the decision which Nav2 server must send a velocity command."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -12,7 +12,7 @@ MS = 1_000_000
 
 
 class FakeGraph:
-    """A graph with the status topics of these actions, and their servers."""
+    """Graph with the status topics of actions; `servers` by action, `rates` in Hz by server."""
 
     def __init__(self, servers: dict[str, str], rates: dict[str, float]) -> None:
         self.servers, self.rates, self.callbacks = servers, rates, dict[str, Any]()

@@ -1,4 +1,4 @@
-"""Check of Nav2's parameters against what simscen publishes."""
+"""Tests of the check that Nav2's parameters match the topics and frames of simscen."""
 
 import re
 from pathlib import Path
@@ -11,7 +11,7 @@ from simscen.core.errors import InvalidInput, UsageError
 from simscen.ros2.nav2.parameter_rules import ParameterProblem, PublishedNames, check, relevant_parameters
 
 PUBLISHED = PublishedNames(["/scan", "/rear/scan"], "/odom", ["base_link"])
-FITS = """\
+VALID_PARAMETERS = """\
 amcl:
   ros__parameters:
     use_sim_time: true
@@ -46,7 +46,7 @@ collision_monitor:
 """
 
 
-def found(node: str, **parameters: object) -> list[ParameterProblem]:
+def parameter_problems(node: str, **parameters: object) -> list[ParameterProblem]:
     return check({node: {key.replace("__", "."): value for key, value in parameters.items()}}, PUBLISHED)
 
 
@@ -69,33 +69,33 @@ def found(node: str, **parameters: object) -> list[ParameterProblem]:
     ],
 )
 def test_a_wrong_parameter_is_found_in_each_node(node: str, parameters: dict[str, object], message: str) -> None:
-    [problem] = found(node, **parameters)
+    [problem] = parameter_problems(node, **parameters)
     assert (problem.node, problem.is_severe) == (node, True)
     assert problem.message.startswith(message)
 
 
 def test_a_point_cloud_source_is_a_warning_unless_it_is_disabled() -> None:
     source = {"plugins": ["o"], "o__observation_sources": "cloud", "o__cloud__data_type": "PointCloud2"}
-    [problem] = found("local_costmap", **source)
+    [problem] = parameter_problems("local_costmap", **source)
     assert (problem.parameter, problem.is_severe) == ("o.cloud.data_type", False)
-    assert found("local_costmap", **source, o__cloud__enabled=False) == []
+    assert parameter_problems("local_costmap", **source, o__cloud__enabled=False) == []
 
 
 @pytest.mark.parametrize("disabled", ["o", "o.front"], ids=["layer", "source"])
 def test_topics_of_disabled_sources_are_not_checked(disabled: str) -> None:
     layer = {"plugins": ["o"], "o.observation_sources": "front", "o.front.topic": "/front"}
-    assert len(found("local_costmap", **layer)) == 1
-    assert found("local_costmap", **layer, **{f"{disabled}.enabled": False}) == []
+    assert len(parameter_problems("local_costmap", **layer)) == 1
+    assert parameter_problems("local_costmap", **layer, **{f"{disabled}.enabled": False}) == []
 
 
 def test_disabled_source_of_the_collision_monitor_is_not_checked() -> None:
     monitor = {"observation_sources": ["front"], "front.type": "scan", "front.topic": "/front"}
-    assert len(found("collision_monitor", **monitor)) == 1
-    assert found("collision_monitor", **monitor, **{"front.enabled": False}) == []
+    assert len(parameter_problems("collision_monitor", **monitor)) == 1
+    assert parameter_problems("collision_monitor", **monitor, **{"front.enabled": False}) == []
 
 
 def test_wall_time_is_a_warning_because_a_launch_file_may_set_it() -> None:
-    [problem] = found("planner_server", use_sim_time=False)
+    [problem] = parameter_problems("planner_server", use_sim_time=False)
     assert not problem.is_severe
 
 
@@ -110,14 +110,15 @@ def test_only_parameters_of_the_rules_are_requested() -> None:
     assert relevant_parameters("amcl", ["alpha1", "scan_topic"]) == ["scan_topic"]
 
 
-def called(folder: Path, text: str, *options: str) -> tuple[int, str]:
+def run_check(folder: Path, text: str, *options: str) -> tuple[int, str]:
+    """Run `simscen ros2 nav2` on a parameter file; return the exit code, and the output or the errors."""
     file = folder / "nav2_params.yaml"
     file.write_text(text)
     try:
-        done = CliRunner().invoke(app, ["ros2", "nav2", "--params", str(file), *options], catch_exceptions=False)
+        completed = CliRunner().invoke(app, ["ros2", "nav2", "--params", str(file), *options], catch_exceptions=False)
     except InvalidInput as error:
         return 2, "\n".join(f"{p.line}:{p.col} {p.code} {p.message}" for p in error.problems)
-    return done.exit_code, done.output
+    return completed.exit_code, completed.output
 
 
 @pytest.mark.parametrize(
@@ -141,17 +142,17 @@ def test_a_topic_that_a_running_node_has_remapped_is_not_wrong(
 
 
 def test_a_correct_file_passes(tmp_path: Path) -> None:
-    code, output = called(tmp_path, FITS)
+    code, output = run_check(tmp_path, VALID_PARAMETERS)
     assert code == 0
     assert "Nav2 can work with" in output
 
 
 def test_wrong_parameters_of_a_file_are_reported_with_their_lines(tmp_path: Path) -> None:
-    text = FITS.replace(
+    text = VALID_PARAMETERS.replace(
         "base_frame_id: base_link\n    odom_frame_id: odom\n    global", "base_frame_id: base\n    global"
     )
     text = text.replace("topic: /scan", "topic: /front")
-    code, output = called(tmp_path, text)
+    code, output = run_check(tmp_path, text)
     assert code == 2
     lines = text.split("\n")
     places = [next(i for i, line in enumerate(lines, 1) if key in line) for key in ("base_frame_id: base", "/front")]
@@ -160,24 +161,24 @@ def test_wrong_parameters_of_a_file_are_reported_with_their_lines(tmp_path: Path
 
 
 def test_a_second_name_of_the_base_frame_is_accepted(tmp_path: Path) -> None:
-    text = FITS.replace("base_link", "base_footprint")
-    assert called(tmp_path, text)[0] == 2
-    assert called(tmp_path, text, "--base-frame", "base_footprint")[0] == 0
+    text = VALID_PARAMETERS.replace("base_link", "base_footprint")
+    assert run_check(tmp_path, text)[0] == 2
+    assert run_check(tmp_path, text, "--base-frame", "base_footprint")[0] == 0
 
 
 def test_another_name_of_the_base_frame_is_accepted(tmp_path: Path) -> None:
-    text = FITS.replace("base_link", "chassis")
-    assert called(tmp_path, text, "--frame", "base_link:=chassis")[0] == 0
-    assert called(tmp_path, FITS, "--frame", "base_link:=chassis")[0] == 2
+    text = VALID_PARAMETERS.replace("base_link", "chassis")
+    assert run_check(tmp_path, text, "--frame", "base_link:=chassis")[0] == 0
+    assert run_check(tmp_path, VALID_PARAMETERS, "--frame", "base_link:=chassis")[0] == 2
 
 
 def test_check_of_a_file_uses_the_given_topic_names(tmp_path: Path) -> None:
-    text = FITS.replace("topic: /scan", "topic: scan").replace("topic: scan", "topic: /front/scan")
-    assert called(tmp_path, text)[0] == 2
-    assert called(tmp_path, text, "--remap", "/scan:=/front/scan")[0] == 0
-    assert called(tmp_path, FITS.replace("topic: /", "topic: "), "--namespace", "robot1")[0] == 0
+    text = VALID_PARAMETERS.replace("topic: /scan", "topic: scan").replace("topic: scan", "topic: /front/scan")
+    assert run_check(tmp_path, text)[0] == 2
+    assert run_check(tmp_path, text, "--remap", "/scan:=/front/scan")[0] == 0
+    assert run_check(tmp_path, VALID_PARAMETERS.replace("topic: /", "topic: "), "--namespace", "robot1")[0] == 0
     with pytest.raises(UsageError, match="not of the form /from:=/to"):
-        called(tmp_path, FITS, "--remap", "scan")
+        run_check(tmp_path, VALID_PARAMETERS, "--remap", "scan")
 
 
 @pytest.mark.parametrize(
@@ -188,14 +189,14 @@ def test_check_of_a_file_uses_the_given_topic_names(tmp_path: Path) -> None:
     ],
 )
 def test_a_frame_that_cannot_be_renamed_is_a_usage_error(tmp_path: Path, rename: str, message: str) -> None:
-    (tmp_path / "nav2_params.yaml").write_text(FITS)
+    (tmp_path / "nav2_params.yaml").write_text(VALID_PARAMETERS)
     words = ["ros2", "nav2", "--params", str(tmp_path / "nav2_params.yaml"), "--frame", rename]
     with pytest.raises(UsageError, match=re.escape(message)):
         CliRunner().invoke(app, words, catch_exceptions=False)
 
 
 def test_a_file_without_parameters_of_nodes_is_refused(tmp_path: Path) -> None:
-    code, output = called(tmp_path, "amcl: {alpha1: 0.2}\n")
+    code, output = run_check(tmp_path, "amcl: {alpha1: 0.2}\n")
     assert code == 2
     assert "it has no key ros__parameters" in output
 
@@ -221,7 +222,7 @@ local_costmap:
         scan:
           topic: /front/scan
 """
-    _, output = called(tmp_path, text)
+    _, output = run_check(tmp_path, text)
     for line in output.split("\n"):
         place, code, message = line.split(" ", 2)
         assert f"nav2_params.yaml:{place}: error[{code}] {message}\n" in page
@@ -230,5 +231,5 @@ local_costmap:
 @pytest.mark.parametrize(("node", "key"), [("local_costmap", "plugins"), ("collision_monitor", "observation_sources")])
 @pytest.mark.parametrize("value", [5, True, "scan"])
 def test_a_list_of_names_of_another_type_is_a_problem(node: str, key: str, value: object) -> None:
-    (problem,) = found(node, **{key: value})
+    (problem,) = parameter_problems(node, **{key: value})
     assert problem == ParameterProblem(node, key, f"{key} is {value!r}; expected a list of names")

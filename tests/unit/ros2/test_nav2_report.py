@@ -1,4 +1,4 @@
-"""What Nav2 reports about itself: values of parameters, and lines for the log."""
+"""Tests of the report on Nav2: parameter values, log lines, errors, and aborted bring-up."""
 
 import math
 from types import SimpleNamespace

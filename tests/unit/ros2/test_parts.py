@@ -1,4 +1,4 @@
-"""Parts of the adapter that work without ROS: topic names, domains, messages, and ending processes."""
+"""Tests of the parts of the adapter that work without ROS: topic names, domains, messages, and launching."""
 
 import ast
 import os
@@ -132,27 +132,27 @@ def _alive(pid: int) -> bool:
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("stubborn", [False, True])
 def test_all_launched_processes_end_with_the_adapter(tmp_path: Path, stubborn: bool) -> None:
-    """A grandchild in a session of its own, whose parent has gone, deaf to SIGINT and SIGTERM."""
-    note = tmp_path / "pid"
-    deaf = "trap '' INT TERM; " if stubborn else ""
-    command = f"setsid sh -c '{deaf}echo $$ > {note}; while :; do sleep 0.05; done' & sleep 600"
+    """The process has its own session and no parent. A stubborn process also ignores SIGINT and SIGTERM."""
+    pid_file = tmp_path / "pid"
+    trap = "trap '' INT TERM; " if stubborn else ""
+    command = f"setsid sh -c '{trap}echo $$ > {pid_file}; while :; do sleep 0.05; done' & sleep 600"
     if stubborn:
-        command = f'setsid sh -c "{deaf}echo \\$\\$ > {note}; while :; do sleep 0.05; done" & sleep 600'
-    keeper = subprocess.Popen([sys.executable, str(FOLDER / "launch.py"), command], stdin=subprocess.PIPE)
-    while not note.exists() or not note.read_text():
+        command = f'setsid sh -c "{trap}echo \\$\\$ > {pid_file}; while :; do sleep 0.05; done" & sleep 600'
+    launcher = subprocess.Popen([sys.executable, str(FOLDER / "launch.py"), command], stdin=subprocess.PIPE)
+    while not pid_file.exists() or not pid_file.read_text():
         time.sleep(0.02)
-    pid = int(note.read_text())
+    pid = int(pid_file.read_text())
     assert _alive(pid)
-    assert keeper.stdin is not None
-    keeper.stdin.close()
-    keeper.wait(30)
+    assert launcher.stdin is not None
+    launcher.stdin.close()
+    launcher.wait(30)
     assert not _alive(pid)
 
 
 def test_the_launcher_exits_with_the_code_of_its_command() -> None:
     for command, code in (("exit 3", 3), ("kill -9 $$", 137)):
-        keeper = subprocess.Popen([sys.executable, str(FOLDER / "launch.py"), command], stdin=subprocess.PIPE)
-        assert keeper.wait(30) == code
+        launcher = subprocess.Popen([sys.executable, str(FOLDER / "launch.py"), command], stdin=subprocess.PIPE)
+        assert launcher.wait(30) == code
 
 
 @pytest.mark.parametrize(
@@ -177,8 +177,8 @@ def test_poses_are_composed() -> None:
 
 def test_all_stamps_of_a_plan_and_of_transforms_are_shifted() -> None:
     poses = [(1.0, 2.0, 0.5), (3.0, 4.0, 0.0)]
-    late = messages.shift_stamps("nav_msgs/msg/Path", peer_messages.path((5, 900_000_000), poses), 1_300_000_000)
-    assert late == peer_messages.path((7, 200_000_000), poses)
+    shifted = messages.shift_stamps("nav_msgs/msg/Path", peer_messages.path((5, 900_000_000), poses), 1_300_000_000)
+    assert shifted == peer_messages.path((7, 200_000_000), poses)
 
     def transforms(first: tuple[int, int], second: tuple[int, int]) -> bytes:
         return peer_messages.transforms(
@@ -187,8 +187,8 @@ def test_all_stamps_of_a_plan_and_of_transforms_are_shifted() -> None:
 
     type_name = "tf2_msgs/msg/TFMessage"
     assert messages.shift_stamps(type_name, transforms((3, 0), (4, 5)), -2 * 10**9) == transforms((1, 0), (2, 5))
-    early = messages.shift_stamps(type_name, transforms((1, 0), (4, 5)), -2 * 10**9)
-    assert early == transforms((0, 0), (2, 5)), "stamps do not become negative"
+    clamped = messages.shift_stamps(type_name, transforms((1, 0), (4, 5)), -2 * 10**9)
+    assert clamped == transforms((0, 0), (2, 5)), "stamps do not become negative"
 
 
 @pytest.mark.parametrize(("text", "number"), [("", 0), ("7", 7)])

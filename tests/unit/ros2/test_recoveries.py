@@ -1,4 +1,4 @@
-"""Recoveries of Nav2 as events."""
+"""Tests of the events for recoveries of Nav2."""
 
 from types import SimpleNamespace
 from typing import Any
@@ -21,7 +21,7 @@ class FakeGraph:
         return "/behavior_server"
 
     def report(self, behavior: str, *goals: tuple[int, int]) -> None:
-        """Publish the status of goals: their ids, and the numbers of GoalStatus."""
+        """Publish the status of goals, given as pairs of id and GoalStatus number."""
         messages = [
             SimpleNamespace(goal_info=SimpleNamespace(goal_id=SimpleNamespace(uuid=[number] * 16)), status=status)
             for number, status in goals
@@ -40,13 +40,13 @@ def events(graph: FakeGraph) -> list[tuple[str, ...]]:
 
 
 @pytest.fixture
-def followed(graph: FakeGraph, events: list[tuple[str, ...]]) -> RecoveryReporter:
-    made = RecoveryReporter(graph, lambda kind, name, **data: events.append((kind, name, *data.values())))  # type: ignore[arg-type]
-    made.subscribe()
-    return made
+def reporter(graph: FakeGraph, events: list[tuple[str, ...]]) -> RecoveryReporter:
+    reporter = RecoveryReporter(graph, lambda kind, name, **data: events.append((kind, name, *data.values())))  # type: ignore[arg-type]
+    reporter.subscribe()
+    return reporter
 
 
-def test_a_behavior_starts_and_ends_once_although_its_status_is_repeated(graph, events, followed) -> None:
+def test_a_behavior_starts_and_ends_once_although_its_status_is_repeated(graph, events, reporter) -> None:
     graph.report("spin", (1, 1))
     assert events == []
     graph.report("spin", (1, 2))
@@ -60,57 +60,57 @@ def test_a_behavior_starts_and_ends_once_although_its_status_is_repeated(graph, 
     ]
 
 
-def test_behavior_with_only_an_observed_end_has_both_events(graph, events, followed) -> None:
+def test_behavior_with_only_an_observed_end_has_both_events(graph, events, reporter) -> None:
     graph.report("wait", (1, 4))
     assert events == [("recovery.started", "wait"), ("recovery.ended", "wait", "succeeded")]
 
 
-def test_counted_recoveries_without_a_behavior_are_costmap_clearing(graph, events, followed) -> None:
-    followed.begin_goal()
-    followed.update_count(1)
-    followed.report_clearing(0)
-    assert events == []  # the status of a behavior may still come
-    followed.report_clearing(1 * S)
+def test_counted_recoveries_without_a_behavior_are_costmap_clearing(graph, events, reporter) -> None:
+    reporter.begin_goal()
+    reporter.update_count(1)
+    reporter.report_clearing(0)
+    assert events == []  # the status of a behavior may still arrive
+    reporter.report_clearing(1 * S)
     clearing = [("recovery.started", "clear_costmap"), ("recovery.ended", "clear_costmap", "succeeded")]
     assert events == clearing
-    followed.update_count(1)
-    followed.report_clearing(3 * S)
+    reporter.update_count(1)
+    reporter.report_clearing(3 * S)
     assert events == clearing
 
 
-def test_a_counted_behavior_is_not_reported_twice(graph, events, followed) -> None:
-    followed.begin_goal()
-    followed.update_count(1)  # the feedback comes before the status
-    followed.report_clearing(0)
+def test_a_counted_behavior_is_not_reported_twice(graph, events, reporter) -> None:
+    reporter.begin_goal()
+    reporter.update_count(1)  # the feedback comes before the status
+    reporter.report_clearing(0)
     graph.report("backup", (1, 2))
-    followed.report_clearing(2 * S)
+    reporter.report_clearing(2 * S)
     assert events == [("recovery.started", "backup")]
 
 
-def test_recovery_count_restarts_with_each_goal(graph, events, followed) -> None:
+def test_recovery_count_restarts_with_each_goal(graph, events, reporter) -> None:
     for now in (0, 10 * S):
-        followed.begin_goal()
-        followed.update_count(2)
-        followed.report_clearing(now)
-        followed.report_clearing(now + S)
+        reporter.begin_goal()
+        reporter.update_count(2)
+        reporter.report_clearing(now)
+        reporter.report_clearing(now + S)
     assert [event[0] for event in events].count("recovery.started") == 4
 
 
-def test_behavior_that_the_last_goal_did_not_count_does_not_hide_a_clearing(graph, events, followed) -> None:
-    followed.begin_goal()
+def test_behavior_that_the_last_goal_did_not_count_does_not_hide_a_clearing(graph, events, reporter) -> None:
+    reporter.begin_goal()
     graph.report("spin", (1, 2))
     graph.report("spin", (1, 5))
-    followed.begin_goal()  # before the feedback that counts the spin
-    followed.update_count(1)
+    reporter.begin_goal()  # before the feedback that counts the spin
+    reporter.update_count(1)
     for now in (10 * S, 11 * S):
-        followed.report_clearing(now)
+        reporter.report_clearing(now)
     assert events[2:] == [("recovery.started", "clear_costmap"), ("recovery.ended", "clear_costmap", "succeeded")]
 
 
-def test_clearing_shortly_before_the_next_goal_is_reported(graph, events, followed) -> None:
-    followed.begin_goal()
-    followed.update_count(1)
-    followed.report_clearing(0)
-    followed.begin_goal()
-    followed.report_clearing(1 * S)
+def test_clearing_shortly_before_the_next_goal_is_reported(graph, events, reporter) -> None:
+    reporter.begin_goal()
+    reporter.update_count(1)
+    reporter.report_clearing(0)
+    reporter.begin_goal()
+    reporter.report_clearing(1 * S)
     assert events == [("recovery.started", "clear_costmap"), ("recovery.ended", "clear_costmap", "succeeded")]
