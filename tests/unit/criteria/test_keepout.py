@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import shapely
 import shapely.affinity
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from simscen.core.records.verdict import Status
@@ -54,8 +54,7 @@ SEEDS = st.integers(0, 2**32 - 1)
 def test_sign_and_positive_distances_equal_those_of_shapely(seed):
     rng = np.random.default_rng(seed)
     footprint, region = star(rng, 0.8, rng.integers(3, 8)), star(rng, 2.0, rng.integers(3, 12))
-    if not (shapely.Polygon(footprint).is_valid and shapely.Polygon(region).is_valid):
-        return
+    assume(shapely.Polygon(footprint).is_valid and shapely.Polygon(region).is_valid)
     x, y, yaw = *rng.uniform(-2.5, 2.5, 2), rng.uniform(-3, 3)
     finding = keepout_finding(region, [[0, x, y, yaw]], footprint, seconds=0.1)
     footprint_at_pose = placed(footprint, x, y, yaw)
@@ -74,9 +73,9 @@ def test_penetration_depth_is_the_shortest_separating_translation(seed):
     footprint, region = convex(star(rng, 0.8, 6)), convex(star(rng, 2.0, 7))
     x, y, yaw = *rng.uniform(-1.5, 1.5, 2), rng.uniform(-3, 3)
     footprint_at_pose = placed(footprint, x, y, yaw)
-    if footprint_at_pose.intersection(shapely.Polygon(region)).area > 1e-9:
-        finding = keepout_finding(region, [[0, x, y, yaw]], footprint, seconds=0.1)
-        assert finding.value == pytest.approx(-penetration_depth(footprint_at_pose, shapely.Polygon(region)), abs=1e-9)
+    assume(footprint_at_pose.intersection(shapely.Polygon(region)).area > 1e-9)
+    finding = keepout_finding(region, [[0, x, y, yaw]], footprint, seconds=0.1)
+    assert finding.value == pytest.approx(-penetration_depth(footprint_at_pose, shapely.Polygon(region)), abs=1e-9)
 
 
 @pytest.mark.parametrize("yaw", [0.0, 0.4, np.pi / 2])
