@@ -1,4 +1,4 @@
-"""Lets the tests of this folder share `synthetic_drives.py`; pytest's importlib mode does not."""
+"""Makes `synthetic_drives.py` and `logged_drive.py` importable, which pytest's importlib mode does not."""
 
 import sys
 from pathlib import Path

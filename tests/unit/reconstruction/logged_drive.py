@@ -11,13 +11,13 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "record"))
 import foreign_logs as logs
 
 LIDAR_SILENT = (8.0, 9.5)
-
-
+"""Begin and end of the time in s in which the log has no scans."""
 GOAL = (6.9, 2.9)
+"""Position of the goal in the map frame, in m."""
 
 
 def walk(time):
-    """Return the position of a person who crosses the way of the robot."""
+    """Return the position at a time in s of a person who crosses the path of the robot."""
     return 5.0, 0.8 + 0.4 * time
 
 
@@ -27,10 +27,10 @@ def scans(with_person):
 
 
 def messages(with_map=True, with_goal=True, idle=0.0, with_person=False):
-    """Return what a robot with a lidar, odometry, and AMCL logs; it stands for `idle` s before its goal."""
+    """Return the log of a robot with a lidar, odometry, and AMCL. It stands for `idle` s before it gets its goal."""
     measured = scans(with_person)
     times = np.arange(0.0, drives.DURATION_S, 0.05)
-    at = drives.poses(times)
+    poses = drives.poses(times)
     rng = np.random.default_rng(7)
     recorded = []
 
@@ -45,15 +45,15 @@ def messages(with_map=True, with_goal=True, idle=0.0, with_person=False):
         add("/map", -idle, occupancy_grid(stamp(-idle)))
     if with_goal:
         add("/goal_pose", 0.0, goal(stamp(0.0)))
-    early = [(-1.0 * wait, at[0]) for wait in np.arange(idle, 0.0, -0.05).tolist()]
-    for time, (x, y, yaw) in [*early, *zip(times.tolist(), at, strict=True)]:
+    standing = [(-1.0 * wait, poses[0]) for wait in np.arange(idle, 0.0, -0.05).tolist()]
+    for time, (x, y, yaw) in [*standing, *zip(times.tolist(), poses, strict=True)]:
         add("/odom", time, odometry(stamp(time), x - 1.0, y - 3.0, yaw))
         if round(time * 20) % 4 == 0:
-            add("/amcl_pose", time, believed(stamp(time), x + rng.normal(0, 0.01), y + rng.normal(0, 0.01), yaw))
+            add("/amcl_pose", time, amcl_pose(stamp(time), x + rng.normal(0, 0.01), y + rng.normal(0, 0.01), yaw))
     for time, ranges in zip(measured.times.tolist(), measured.ranges, strict=True):
         if not LIDAR_SILENT[0] <= time < LIDAR_SILENT[1]:
             add("/scan", time, scan(stamp(time), ranges))
-    return sorted(recorded, key=lambda one: one.time)
+    return sorted(recorded, key=lambda entry: entry.time)
 
 
 def occupancy_grid(time):
@@ -76,7 +76,7 @@ def odometry(time, x, y, yaw):
     return message
 
 
-def believed(time, x, y, yaw):
+def amcl_pose(time, x, y, yaw):
     message = logs.estimated_pose(time, x)
     message.pose.pose = logs.pose(x, y, yaw)
     return message

@@ -1,4 +1,4 @@
-"""Clusters of hits of a scan, which turns with the lidar while the scanned objects stay in place."""
+"""Tests of clusters of lidar hits, which do not depend on the heading of the lidar."""
 
 import numpy as np
 import pytest
@@ -23,13 +23,13 @@ def clusters_of_arc(distance, offsets, yaw):
     """Return the clusters of hits at `offsets` from straight ahead, seen by a lidar with this yaw; all in degrees."""
     world = StaticWorld(World("hall", HALL), drives.HEIGHT)
     times = np.arange(0.0, 0.5, 0.1)
-    at = np.tile([0.0, 0.0, np.radians(yaw)], (len(times), 1))
-    ranges = world.ranges_from(at, drives.ANGLES, 50.0)
+    poses = np.tile([0.0, 0.0, np.radians(yaw)], (len(times), 1))
+    ranges = world.ranges_from(poses, drives.ANGLES, 50.0)
     ranges[:, [(drives.BEAMS // 2 + offset - yaw) % drives.BEAMS for offset in offsets]] = distance
     measured = Scans(
         times, times, ranges, drives.ANGLES, 0.1, 50.0, Pose2(0.0, 0.0), drives.HEIGHT, np.zeros(len(times), bool)
     )
-    drive = drives.drive(measured, poses=drives.signal(times, at))
+    drive = drives.drive(measured, poses=drives.signal(times, poses))
     return scan_clusters(compare_scans(drive, measured, world), world, has_true_poses=True)[0]
 
 

@@ -1,3 +1,5 @@
+"""Tests of the comparison of a recorded drive with the run of its reconstructed scenario, and of its page."""
+
 import sys
 from dataclasses import replace
 from pathlib import Path
@@ -25,41 +27,44 @@ from simscen.reconstruction.verification.page import verification_page
 STUCK = Incident("stuck", 10.0, (3.0, 2.0), "the robot stayed", "stuck")
 
 
-def shifted(drive, metres):
-    return replace(drive, poses=drives.signal(drive.poses.times, drive.poses.values + np.array([0.0, metres, 0.0])))
+def shifted(drive, meters):
+    """Return the drive with poses that are shifted along the y axis."""
+    return replace(drive, poses=drives.signal(drive.poses.times, drive.poses.values + np.array([0.0, meters, 0.0])))
 
 
 def test_equal_drives_have_no_difference():
-    one = drives.drive(drives.scans())
-    rows = {row.name: row.difference for row in compare_drives(one, one)}
+    recorded = drives.drive(drives.scans())
+    rows = {row.name: row.difference for row in compare_drives(recorded, recorded)}
     assert rows["distance at the same time"] == "0.00 m RMS, at most 0.00 m"
     assert rows["duration"] == "+0.00 s"
     assert rows["ranges at the same place"].startswith("100 %")
 
 
-def test_a_shifted_drive_is_that_far_away():
+def test_distance_to_a_shifted_drive_is_the_shift():
     rows = {row.name: row.difference for row in compare_drives(drives.drive(), shifted(drives.drive(), 0.2))}
     assert rows["distance at the same time"] == "0.20 m RMS, at most 0.20 m"
 
 
-def test_scans_are_compared_in_the_same_directions_and_without_what_did_not_return():
-    one = drives.drive(drives.scans())
+def test_scans_are_compared_in_the_same_directions_and_without_beams_that_did_not_return():
+    recorded = drives.drive(drives.scans())
     turned = replace(
-        one,
-        poses=drives.signal(one.poses.times, one.poses.values + np.array([0.0, 0.0, 0.5])),
-        scans=replace(one.scans, angles=one.scans.angles - 0.5),
+        recorded,
+        poses=drives.signal(recorded.poses.times, recorded.poses.values + np.array([0.0, 0.0, 0.5])),
+        scans=replace(recorded.scans, angles=recorded.scans.angles - 0.5),
     )
-    zeros = one.scans.ranges.copy()
+    zeros = recorded.scans.ranges.copy()
     zeros[:, ::3] = 0.0
     times = np.arange(0.0, 10.0, 0.1)
-    assert fraction_of_equal_ranges(one, turned, times) > 0.98
-    assert fraction_of_equal_ranges(replace(one, scans=replace(one.scans, ranges=zeros)), one, times) == 1.0
-    assert fraction_of_equal_ranges(one, replace(one, poses=turned.poses), times) < 0.7
+    assert fraction_of_equal_ranges(recorded, turned, times) > 0.98
+    assert (
+        fraction_of_equal_ranges(replace(recorded, scans=replace(recorded.scans, ranges=zeros)), recorded, times) == 1.0
+    )
+    assert fraction_of_equal_ranges(recorded, replace(recorded, poses=turned.poses), times) < 0.7
 
 
 def test_scans_are_compared_only_where_both_robots_are_at_one_place():
-    one = drives.drive(drives.scans())
-    assert fraction_of_equal_ranges(one, shifted(one, 1.0), np.arange(0.0, 10.0, 0.1)) is None
+    recorded = drives.drive(drives.scans())
+    assert fraction_of_equal_ranges(recorded, shifted(recorded, 1.0), np.arange(0.0, 10.0, 0.1)) is None
 
 
 def test_the_same_incident_nearby_is_reproduced():
@@ -82,11 +87,13 @@ def test_another_kind_of_incident_does_not_count():
 
 
 def test_the_page_loads_nothing_and_escapes_names():
-    one = drives.drive()
+    recorded = drives.drive()
     incidents, others = compare_incidents([STUCK], [])
-    verified = Verification(one, one, Path("x.mcap"), [*compare_drives(one, one)], incidents, others, ["stuck"])
-    thing = FoundObject("<b>cart</b>", (0.9, 0.6), ((0.0, 4.0, 1.0, 0.0),))
-    page = verification_page("<script>", drives.room(), [thing], verified)
+    verified = Verification(
+        recorded, recorded, Path("x.mcap"), [*compare_drives(recorded, recorded)], incidents, others, ["stuck"]
+    )
+    cart = FoundObject("<b>cart</b>", (0.9, 0.6), ((0.0, 4.0, 1.0, 0.0),))
+    page = verification_page("<script>", drives.room(), [cart], verified)
     assert "<script>" not in page and "<b>cart" not in page
     assert "http" not in page.replace("http-equiv", "")
     assert "default-src 'none'" in page
@@ -97,17 +104,21 @@ def test_the_page_loads_nothing_and_escapes_names():
 
 @pytest.mark.parametrize("steps", [0.0, 0.3])
 def test_a_drive_is_compared_with_a_shorter_one(steps):
-    one = drives.drive()
-    kept = one.poses.times < 5.0 + steps
-    short = replace(one, duration=5.0 + steps, poses=drives.signal(one.poses.times[kept], one.poses.values[kept]))
-    rows = {row.name: row.difference for row in compare_drives(one, short)}
+    recorded = drives.drive()
+    is_kept = recorded.poses.times < 5.0 + steps
+    shorter = replace(
+        recorded,
+        duration=5.0 + steps,
+        poses=drives.signal(recorded.poses.times[is_kept], recorded.poses.values[is_kept]),
+    )
+    rows = {row.name: row.difference for row in compare_drives(recorded, shorter)}
     assert rows["distance at the same time"].startswith("0.00 m")
 
 
-def test_the_page_shows_the_clearance_and_what_is_not_on_the_map():
+def test_the_page_shows_the_clearance_and_objects_that_are_not_on_the_map():
     measured = drives.scans(lambda time: [drives.body(4.5, 1.0, 0.0, (0.8, 0.4))])
-    one = drives.drive(measured)
-    verified = Verification(one, drives.drive(drives.scans()), Path("x.mcap"), [], [], [], [])
+    recorded = drives.drive(measured)
+    verified = Verification(recorded, drives.drive(drives.scans()), Path("x.mcap"), [], [], [], [])
     page = verification_page("drive", drives.room(), [], verified)
     pictures = page.split("data:image/png;base64,")[1:]
     assert len(pictures) == 2 and pictures[0].partition('"')[0] != pictures[1].partition('"')[0]

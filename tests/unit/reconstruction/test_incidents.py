@@ -1,3 +1,5 @@
+"""Tests of the incidents that are found in a recorded drive, and of the criteria that are proposed for it."""
+
 from dataclasses import replace
 
 import numpy as np
@@ -17,12 +19,16 @@ def drive(**changes):
     return replace(drives.drive(), goals=(REACHED,), **changes)
 
 
-def kinds(one):
-    return [incident.kind for incident in find_incidents(one)]
+def kinds(recorded):
+    return [incident.kind for incident in find_incidents(recorded)]
 
 
-def limits(one, invalid_goals=False):
-    return {one.kind: dict(one.values) for one in propose_criteria(one, find_incidents(one), (), invalid_goals)}
+def limits(recorded, invalid_goals=False):
+    """Return the limits of the proposed criteria by kind."""
+    return {
+        criterion.kind: dict(criterion.values)
+        for criterion in propose_criteria(recorded, find_incidents(recorded), (), invalid_goals)
+    }
 
 
 def test_a_drive_that_reaches_its_goal_has_no_incident():
@@ -53,20 +59,22 @@ def test_without_a_ground_truth_an_uncertain_belief_is_lost():
 
 def test_a_robot_that_stays_in_place_with_a_goal_is_stuck():
     times = np.arange(0.0, 30.0, 0.1)
-    stands = np.tile([1.0, 3.0, 0.0], (len(times), 1))
+    poses = np.tile([1.0, 3.0, 0.0], (len(times), 1))
     goal = replace(REACHED, end_time=None, status="unknown")
-    one = replace(drives.drive(), duration=30.0, poses=drives.signal(times, stands), goals=(goal,))
-    assert "stuck" in kinds(one) and "unfinished goal" in kinds(one)
+    recorded = replace(drives.drive(), duration=30.0, poses=drives.signal(times, poses), goals=(goal,))
+    assert "stuck" in kinds(recorded) and "unfinished goal" in kinds(recorded)
 
 
 @pytest.mark.parametrize(("speed", "expected"), [(0.0, []), (0.3, ["stuck"])])
-def test_a_parked_robot_whose_goal_is_where_it_stopped_is_not_stuck(speed, expected):
+def test_a_parked_robot_whose_goal_is_its_stop_is_not_stuck(speed, expected):
     times = np.arange(0.0, 30.0, 0.1)
-    stands = np.tile([1.0, 3.0, 0.0], (len(times), 1))
-    text = drives.signal(times, np.column_stack((np.full(len(times), speed), np.zeros((len(times), 2)))))
+    poses = np.tile([1.0, 3.0, 0.0], (len(times), 1))
+    commands = drives.signal(times, np.column_stack((np.full(len(times), speed), np.zeros((len(times), 2)))))
     goal = replace(REACHED, end_time=30.0, source=STOP_SOURCE)
-    one = replace(drives.drive(), duration=30.0, poses=drives.signal(times, stands), goals=(goal,), commands=text)
-    assert [kind for kind in kinds(one) if kind == "stuck"] == expected
+    recorded = replace(
+        drives.drive(), duration=30.0, poses=drives.signal(times, poses), goals=(goal,), commands=commands
+    )
+    assert [kind for kind in kinds(recorded) if kind == "stuck"] == expected
 
 
 def test_a_failed_goal_is_an_incident_with_its_code():
@@ -84,13 +92,13 @@ def test_the_longest_stay_begins_where_the_robot_stops():
     assert length == pytest.approx(12.4, abs=0.4)
 
 
-def test_held_criteria_leave_a_margin():
-    found = limits(drive())
+def test_limits_of_satisfied_criteria_have_a_margin():
+    proposed = limits(drive())
     efficiency = ["time_to_goal", "path_length", "speed"]
-    assert list(found) == ["goals_reached", "collisions", "localization_error", *efficiency]
-    assert found["speed"] == {"max": "0.7 m/s"}
-    assert found["time_to_goal"] == {"max": "14 s"}
-    assert found["localization_error"] == {"max": 0.25}
+    assert list(proposed) == ["goals_reached", "collisions", "localization_error", *efficiency]
+    assert proposed["speed"] == {"max": "0.7 m/s"}
+    assert proposed["time_to_goal"] == {"max": "14 s"}
+    assert proposed["localization_error"] == {"max": 0.25}
 
 
 @pytest.mark.parametrize("scale", [0.5, 2.0])
@@ -99,33 +107,36 @@ def test_limit_of_the_speed_is_from_the_ground_truth(scale):
     assert limits(drive(odometry=replace(odometry, values=scale * odometry.values)))["speed"] == {"max": "0.7 m/s"}
 
 
-def test_limit_of_the_speed_ignores_a_robot_that_is_carried_off():
+def test_limit_of_the_speed_ignores_a_kidnapping():
     poses = drives.drive().poses.values.copy()
     poses[200:, 1] += 1.0
-    carried = drive(poses=drives.signal(drives.drive().poses.times, poses))
-    assert limits(carried)["speed"] == {"max": "0.7 m/s"}
+    moved = drive(poses=drives.signal(drives.drive().poses.times, poses))
+    assert limits(moved)["speed"] == {"max": "0.7 m/s"}
 
 
-def test_a_broken_criterion_has_the_limit_that_was_broken():
+def test_a_violated_criterion_has_the_limit_that_was_violated():
     times = np.arange(0.0, 30.0, 0.1)
-    stands = np.tile([1.0, 3.0, 0.0], (len(times), 1))
+    poses = np.tile([1.0, 3.0, 0.0], (len(times), 1))
     goal = replace(REACHED, end_time=None, status="unknown")
-    one = replace(drives.drive(), duration=30.0, poses=drives.signal(times, stands), goals=(goal,))
-    found = limits(one)
-    assert found["stuck"] == {"max": "10 s"}
-    assert "time_to_goal" not in found
+    recorded = replace(drives.drive(), duration=30.0, poses=drives.signal(times, poses), goals=(goal,))
+    proposed = limits(recorded)
+    assert proposed["stuck"] == {"max": "10 s"}
+    assert "time_to_goal" not in proposed
 
 
-def reasons(one):
-    return {each.kind: each.reason.comment for each in propose_criteria(one, find_incidents(one), (), False)}
+def reasons(recorded):
+    return {
+        criterion.kind: criterion.reason.comment
+        for criterion in propose_criteria(recorded, find_incidents(recorded), (), False)
+    }
 
 
-def test_criteria_do_not_state_what_the_log_does_not_show():
+def test_reasons_of_criteria_do_not_claim_more_than_the_log_shows():
     canceled = replace(drives.drive(), goals=(replace(REACHED, status="canceled"),))
     assert reasons(canceled)["goals_reached"].startswith("the log does not show that all goals were reached")
     assert reasons(drive())["goals_reached"].startswith("held: all goals were reached")
     no_bumper = "the log does not show contacts, because it has no bumper"
     assert reasons(drive(bumper=no_values(1)))["collisions"].startswith(no_bumper)
     times = np.arange(0.0, drives.DURATION_S, 0.05)
-    free = drives.signal(times, np.zeros(len(times)))
-    assert reasons(drive(bumper=free))["collisions"].startswith("held: no contact")
+    never_pressed = drives.signal(times, np.zeros(len(times)))
+    assert reasons(drive(bumper=never_pressed))["collisions"].startswith("held: no contact")

@@ -1,3 +1,5 @@
+"""Tests of the faults of a lidar that are found in a recorded drive."""
+
 from dataclasses import replace
 
 import numpy as np
@@ -17,11 +19,12 @@ from simscen.reconstruction.static_world import StaticWorld
 
 
 def number(fault, key):
+    """Return the number of a value of the fault without its unit."""
     return float(str(fault.values[key]).split()[0])
 
 
 def all_faults(measured):
-    """Return what the estimators find, in their order."""
+    """Return all faults of the lidar that the estimators find in these scans."""
     drive = replace(drives.drive(measured), odometry=no_values(6), commands=no_values(3), turn_rates=no_values(1))
     robot = RobotProperties(lidar_noise=drives.NOISE_M, is_known=True)
     return [fault for fault in run_estimators(drive, drives.room(), robot).faults if fault.target == "lidar"]
@@ -31,7 +34,7 @@ def test_a_good_lidar_has_no_fault():
     assert all_faults(drives.scans()) == []
 
 
-def test_a_lidar_that_measures_nothing_has_no_error_of_its_mount():
+def test_a_lidar_without_returns_has_no_mount_error():
     measured = drives.scans()
     blind = drives.with_ranges(measured, np.full_like(measured.ranges, np.inf))
     assert mount_error(drives.compared_scans(blind), drives.room()) == Pose2(0.0, 0.0, 0.0)
@@ -65,9 +68,9 @@ def test_a_blind_sector_of_a_fine_lidar_has_two_ends():
 def test_beams_lost_for_a_while_are_a_beam_dropout_in_that_time():
     measured = drives.scans()
     ranges = measured.ranges.copy()
-    lost = np.random.default_rng(2).random(ranges.shape) < 0.4
-    lost[(measured.times < 3.0) | (measured.times > 7.0)] = False
-    ranges[lost] = np.nan
+    is_lost = np.random.default_rng(2).random(ranges.shape) < 0.4
+    is_lost[(measured.times < 3.0) | (measured.times > 7.0)] = False
+    ranges[is_lost] = np.nan
     (fault,) = all_faults(drives.with_ranges(measured, ranges))
     assert (fault.kind, fault.begin) == ("beam_dropout", pytest.approx(3.0, abs=0.15))
     assert fault.duration == pytest.approx(4.0, abs=0.3)
@@ -82,8 +85,8 @@ def test_far_objects_that_are_not_seen_are_a_range_limit():
 
 def test_single_beams_that_end_early_are_dust():
     measured, rng = drives.scans(), np.random.default_rng(5)
-    first = rng.exponential(30.0, measured.ranges.shape)
-    (fault,) = all_faults(drives.with_ranges(measured, np.minimum(first, measured.ranges)))
+    dust_ranges = rng.exponential(30.0, measured.ranges.shape)
+    (fault,) = all_faults(drives.with_ranges(measured, np.minimum(dust_ranges, measured.ranges)))
     assert (fault.kind, number(fault, "mean_free_path")) == ("dust", pytest.approx(30, rel=0.35))
 
 
@@ -97,7 +100,7 @@ def test_returns_that_move_with_the_lidar_are_a_ghost_fault():
     assert number(fault, "direction") == pytest.approx(0.0, abs=1.0)
 
 
-def test_more_noise_than_the_lidar_has_is_a_noise_fault():
+def test_more_noise_than_the_lidar_normally_has_is_a_noise_fault():
     measured = drives.scans()
     ranges = measured.ranges + np.random.default_rng(6).normal(0, 0.05, measured.ranges.shape)
     (fault,) = all_faults(drives.with_ranges(measured, ranges))
@@ -124,10 +127,10 @@ def test_systematic_range_errors_are_distinguished(change, kind, key, value):
 
 def test_beams_that_pass_through_a_named_obstacle_are_glass():
     measured = drives.scans()
-    without = [solid for solid in drives.ROOM if solid.name != "shelf"]
-    world = StaticWorld(World("room", tuple(without)), drives.HEIGHT)
-    through = world.ranges_from(drives.poses(measured.times), drives.ANGLES, 12.0)
-    compared = drives.compared_scans(drives.with_ranges(measured, through))
+    solids_without_shelf = [solid for solid in drives.ROOM if solid.name != "shelf"]
+    world = StaticWorld(World("room", tuple(solids_without_shelf)), drives.HEIGHT)
+    ranges_through_shelf = world.ranges_from(drives.poses(measured.times), drives.ANGLES, 12.0)
+    compared = drives.compared_scans(drives.with_ranges(measured, ranges_through_shelf))
     fault = glass_fault(compared, drives.room(), usable_scans(compared))
     assert fault is not None
     assert (fault.kind, fault.values["of"], number(fault, "probability")) == (
@@ -137,7 +140,7 @@ def test_beams_that_pass_through_a_named_obstacle_are_glass():
     )
 
 
-def test_faults_have_the_names_of_the_robots_own_sensors():
+def test_faults_name_the_sensors_of_the_robot_file():
     measured = drives.scans()
     drive = drives.drive(drives.with_ranges(measured, np.where(measured.ranges > 3.0, np.inf, measured.ranges)))
     robot = RobotProperties(sensors={"lidar": "front laser"}, is_known=True)
@@ -148,12 +151,12 @@ def test_faults_have_the_names_of_the_robots_own_sensors():
 def test_a_fault_of_a_sensor_that_the_robot_lacks_is_only_mentioned():
     drive = drives.drive(drives.scans())
     rates = drives.signal(drive.turn_rates.times, drive.turn_rates.values + 0.05)
-    found = run_estimators(replace(drive, turn_rates=rates), drives.room(), RobotProperties(sensors={"lidar": "lidar"}))
-    assert found.faults == []
-    assert any("imu.bias" in unknown for unknown in found.unknowns)
+    parts = run_estimators(replace(drive, turn_rates=rates), drives.room(), RobotProperties(sensors={"lidar": "lidar"}))
+    assert parts.faults == []
+    assert any("imu.bias" in unknown for unknown in parts.unknowns)
 
 
-def test_a_map_of_the_same_scans_shows_no_error_of_their_ranges():
+def test_range_errors_are_not_estimated_with_a_map_built_from_the_same_scans():
     drive = drives.drive(drives.with_ranges(measured := drives.scans(), measured.ranges + 0.05))
     kinds = [fault.kind for fault in run_estimators(drive, drives.room()).faults]
     assert kinds == ["bias"]

@@ -1,3 +1,5 @@
+"""Tests of the faults that are found in the times of the messages of a sensor."""
+
 import numpy as np
 import pytest
 import synthetic_drives as drives
@@ -8,16 +10,17 @@ TIMES = np.arange(0.0, 30.0, 0.1)
 END = 30.0
 
 
-def found(times, arrivals=None):
+def lidar_faults(times, arrivals=None):
+    """Return the faults of a lidar that measures at these times; without `arrivals`, messages have no delay."""
     return list(stream_faults("lidar", times, times if arrivals is None else arrivals, END))
 
 
 def test_a_regular_stream_has_no_fault():
-    assert found(TIMES) == []
+    assert lidar_faults(TIMES) == []
 
 
 def test_a_gap_is_an_outage_with_its_time():
-    (fault,) = found(TIMES[(TIMES < 9.95) | (TIMES > 13.0)])
+    (fault,) = lidar_faults(TIMES[(TIMES < 9.95) | (TIMES > 13.0)])
     assert (fault.kind, fault.begin, fault.duration) == (
         "off",
         pytest.approx(9.95, abs=0.1),
@@ -26,43 +29,43 @@ def test_a_gap_is_an_outage_with_its_time():
 
 
 def test_a_stream_that_ends_early_is_off_until_the_end():
-    (fault,) = found(TIMES[TIMES < 20.0])
+    (fault,) = lidar_faults(TIMES[TIMES < 20.0])
     assert (fault.kind, fault.duration) == ("off", None)
     assert fault.begin == pytest.approx(20.0, abs=0.1)
 
 
 def test_messages_lost_at_random_are_a_dropout_with_its_probability():
-    kept = np.random.default_rng(3).random(len(TIMES)) > 0.3
-    (fault,) = [one for one in found(TIMES[kept]) if one.kind == "dropout"]
+    is_kept = np.random.default_rng(3).random(len(TIMES)) > 0.3
+    (fault,) = [fault for fault in lidar_faults(TIMES[is_kept]) if fault.kind == "dropout"]
     assert float(str(fault.values["probability"]).split()[0]) == pytest.approx(30, abs=8)
 
 
 def test_a_sensor_that_measures_irregularly_loses_nothing():
-    """A robot polled over Wi-Fi: 90 % of the periods of its public log are 0.156 to 0.268 s."""
+    """In a public log of a robot that is polled over Wi-Fi, 90 % of the periods are 0.156 to 0.268 s."""
     steps = np.random.default_rng(4).uniform(0.15, 0.28, 150)
     steps[60:65] = 0.3
     times = np.cumsum(steps)
-    assert [fault.kind for fault in found(times[times < END])] == []
+    assert [fault.kind for fault in lidar_faults(times[times < END])] == []
 
 
 def test_several_gaps_are_an_intermittent_sensor():
-    kept = (TIMES % 4.0) < 3.0
-    (fault,) = found(TIMES[kept])
+    is_kept = (TIMES % 4.0) < 3.0
+    (fault,) = lidar_faults(TIMES[is_kept])
     assert fault.kind == "intermittent"
     assert float(str(fault.values["down"]).split()[0]) == pytest.approx(1.0, abs=0.15)
 
 
 def test_late_messages_are_a_delay_with_latency_and_jitter():
-    late = 0.2 + 0.1 * np.random.default_rng(1).random(len(TIMES))
-    (fault,) = found(TIMES, TIMES + late)
+    delays = 0.2 + 0.1 * np.random.default_rng(1).random(len(TIMES))
+    (fault,) = lidar_faults(TIMES, TIMES + delays)
     assert (fault.kind, fault.begin) == ("delay", None)
     assert float(str(fault.values["latency"]).split()[0]) == pytest.approx(200, abs=15)
     assert float(str(fault.values["jitter"]).split()[0]) == pytest.approx(100, abs=20)
 
 
 def test_a_lower_rate_in_a_part_of_the_drive_is_a_slow_sensor():
-    slow = np.concatenate((TIMES[TIMES < 10], np.arange(10.0, 20.0, 0.4), TIMES[TIMES >= 20]))
-    (fault,) = found(slow)
+    slow_times = np.concatenate((TIMES[TIMES < 10], np.arange(10.0, 20.0, 0.4), TIMES[TIMES >= 20]))
+    (fault,) = lidar_faults(slow_times)
     assert (fault.kind, fault.values["rate"]) == ("slow", "2.50 Hz")
     assert fault.begin == pytest.approx(10.0, abs=0.5)
 

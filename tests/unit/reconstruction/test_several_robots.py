@@ -1,4 +1,4 @@
-"""A log of simscen with several robots gives a scenario with one of them; the others become moving objects."""
+"""Tests of reconstructing one robot of a log with several robots. The other robots become moving objects."""
 
 import sys
 from dataclasses import replace
@@ -41,17 +41,17 @@ def log(tmp_path_factory) -> Path:
 
 
 def test_the_scenario_has_the_chosen_robot_and_the_other_one_as_a_moving_object(log, tmp_path):
-    made = scenario_from_log(
+    reconstruction = scenario_from_log(
         log, tmp_path / "red.scenario.yaml", ReconstructionOptions(files=GivenFiles(robot="red"), root=log.parent)
     )
-    assert made.contents.start.distance(Pose2(1.0, 1.0)) < 0.01
-    (goal,) = made.contents.goals
+    assert reconstruction.contents.start.distance(Pose2(1.0, 1.0)) < 0.01
+    (goal,) = reconstruction.contents.goals
     assert goal.pose.distance(Pose2(2.5, 1.0)) < 0.01
-    (blue,) = made.contents.estimated.objects
+    (blue,) = reconstruction.contents.estimated.objects
     assert blue.name == "blue" and blue.is_moving and blue.pedestrian is None
     x, y, _ = blue.poses_at(np.array([0.0]))[0]
     assert (x, y) == pytest.approx((8.0, 4.0), abs=0.05)
-    assert load_scenario(made.file, tmp_path).spec.robot.model == "turtlebot"
+    assert load_scenario(reconstruction.file, tmp_path).spec.robot.model == "turtlebot"
 
 
 @pytest.mark.parametrize("name", ["", "green"])
@@ -75,9 +75,9 @@ def test_a_robot_without_a_lidar_does_not_get_the_scans_of_another_one(log):
 
 @pytest.mark.parametrize("robot", ["a", "s", "robot"])
 def test_topics_are_those_of_the_robot_whatever_its_name(robot, tmp_path):
-    recorded = [replace(one, topic=f"/{robot}{one.topic}") for one in logs.drive(2.0)]
-    read = collect_messages(logs.write_mcap(tmp_path / "log.mcap", recorded), {"truth": "/mocap"}, robot=robot)
-    assert {role for role in ("odom", "amcl_pose", "scan", "cmd_vel", "truth") if not read.get(role)} == set()
+    recorded = [replace(entry, topic=f"/{robot}{entry.topic}") for entry in logs.drive(2.0)]
+    collected = collect_messages(logs.write_mcap(tmp_path / "log.mcap", recorded), {"truth": "/mocap"}, robot=robot)
+    assert {role for role in ("odom", "amcl_pose", "scan", "cmd_vel", "truth") if not collected.get(role)} == set()
     topics = {"odom": f"/{robot}/odom", "truth": f"/{robot}/mocap"}
-    named = collect_messages(tmp_path / "log.mcap", topics, robot=robot)
-    assert named.get("odom") and named.get("truth")
+    collected_by_topic = collect_messages(tmp_path / "log.mcap", topics, robot=robot)
+    assert collected_by_topic.get("odom") and collected_by_topic.get("truth")

@@ -1,3 +1,5 @@
+"""Tests of the static world of a recorded drive: walls of a map, and the map that is built from scans."""
+
 import numpy as np
 import synthetic_drives as drives
 
@@ -7,7 +9,7 @@ from simscen.reconstruction.drive.recorded_drive import Scans
 from simscen.reconstruction.static_world import UNMAPPED_DISTANCE_M, StaticWorld, map_from_scans, world_from_map
 
 
-def test_nothing_is_near_a_wall_on_a_map_without_walls():
+def test_distance_to_walls_is_the_maximum_on_a_map_without_walls():
     grid = OccupancyGrid(np.full((100, 100), FREE, np.int8), 0.05, Pose2(0.0, 0.0))
     world = StaticWorld(world_from_map(grid, "free"), drives.HEIGHT)
     assert (world.distance_to_walls(np.array([[0.02, 0.02], [2.5, 2.5]])) == UNMAPPED_DISTANCE_M).all()

@@ -1,4 +1,4 @@
-"""Logs that cannot be reconstructed, or only in part: errors, notes, and the files that are left."""
+"""Tests of logs that cannot be reconstructed, or only in part: errors, notes, and remaining files."""
 
 import math
 import sys
@@ -29,32 +29,32 @@ def bag(tmp_path_factory):
 
 def test_poses_with_an_invalid_orientation_are_named(tmp_path):
     recorded = logs.drive()
-    turned = [one.message.pose.orientation for one in recorded if one.topic == "/mocap"][3:5]
-    for orientation in turned:
+    orientations = [entry.message.pose.orientation for entry in recorded if entry.topic == "/mocap"][3:5]
+    for orientation in orientations:
         orientation.w = 0.0
     drive = read_drive(logs.write_mcap(tmp_path / "a.mcap", recorded), "/mocap")
     assert "2 poses on /mocap, whose orientation is invalid" in drive.notes
     assert len(drive.poses.times) > 190
-    for one in recorded:
-        if one.topic == "/mocap":
-            one.message.pose.orientation.w = 0.0
+    for entry in recorded:
+        if entry.topic == "/mocap":
+            entry.message.pose.orientation.w = 0.0
     with pytest.raises(InvalidInput, match="all messages of /mocap have an invalid orientation"):
         read_drive(logs.write_mcap(tmp_path / "b.mcap", recorded), "/mocap")
 
 
 def test_a_log_without_poses_is_refused_with_a_hint(tmp_path):
-    only_scans = [recorded for recorded in messages() if recorded.topic == "/scan"]
+    only_scans = [entry for entry in messages() if entry.topic == "/scan"]
     with pytest.raises(InvalidInput, match="no poses of the robot") as error:
         read_drive(logs.write_bag(tmp_path / "bag", only_scans))
     assert "--topic" in error.value.problems[0].hint
 
 
 def test_log_without_scans_lists_what_could_not_be_reconstructed(tmp_path):
-    without = [recorded for recorded in messages() if recorded.topic != "/scan"]
-    bag = logs.write_bag(tmp_path / "bag", without)
-    made = scenario_from_log(bag, tmp_path / "site.scenario.yaml", ReconstructionOptions())
-    assert made.contents.estimated.objects == []
-    assert any("no scans" in unknown for unknown in made.contents.unknowns)
+    messages_without_scans = [entry for entry in messages() if entry.topic != "/scan"]
+    bag = logs.write_bag(tmp_path / "bag", messages_without_scans)
+    reconstruction = scenario_from_log(bag, tmp_path / "site.scenario.yaml", ReconstructionOptions())
+    assert reconstruction.contents.estimated.objects == []
+    assert any("no scans" in unknown for unknown in reconstruction.contents.unknowns)
 
 
 @pytest.mark.parametrize(
@@ -75,9 +75,9 @@ def test_topics_that_the_user_names_must_have_usable_messages(truth, topics, tex
 def test_a_ground_truth_far_from_the_origin_is_refused(tmp_path):
     """UTM coordinates are up to 10,000 km."""
     recorded = messages()
-    for one in recorded:
-        if one.topic == "/odom":
-            one.message.pose.pose.position.y += 3e6
+    for entry in recorded:
+        if entry.topic == "/odom":
+            entry.message.pose.pose.position.y += 3e6
     with pytest.raises(InvalidInput, match="no pose with valid coordinates"):
         read_drive(logs.write_bag(tmp_path / "bag", recorded), "/odom")
 
@@ -97,32 +97,32 @@ def test_an_unusable_log_ends_with_exit_code_2_and_leaves_no_file(name, content,
     assert not target.exists()
 
 
-def with_nan(recorded):
-    recorded.message.pose.pose.position.x = math.nan
+def with_nan(entry):
+    entry.message.pose.pose.position.x = math.nan
 
 
-def without_stamp(recorded):
-    recorded.message.header.stamp = logs.stamp_of(0)
+def without_stamp(entry):
+    entry.message.header.stamp = logs.stamp_of(0)
 
 
-def without_beams(recorded):
-    recorded.message.ranges = np.zeros(0, dtype=np.float32)
+def without_beams(entry):
+    entry.message.ranges = np.zeros(0, dtype=np.float32)
 
 
-def with_one_direction(recorded):
-    recorded.message.angle_increment = 0.0
+def with_one_direction(entry):
+    entry.message.angle_increment = 0.0
 
 
-def with_nan_angles(recorded):
-    recorded.message.angle_min = math.nan
+def with_nan_angles(entry):
+    entry.message.angle_min = math.nan
 
 
-def with_nan_limit(recorded):
-    recorded.message.range_max = math.nan
+def with_nan_limit(entry):
+    entry.message.range_max = math.nan
 
 
-def without_resolution(recorded):
-    recorded.message.info.resolution = 0.0
+def without_resolution(entry):
+    entry.message.info.resolution = 0.0
 
 
 @pytest.mark.parametrize(
@@ -140,33 +140,33 @@ def without_resolution(recorded):
 )
 def test_a_log_with_invalid_messages_gives_a_valid_scenario(topic, change, changes_all, text, tmp_path):
     recorded = messages()
-    chosen = [one for one in recorded if one.topic == topic]
-    for one in chosen if changes_all else chosen[30:31]:
-        change(one)
+    topic_messages = [entry for entry in recorded if entry.topic == topic]
+    for entry in topic_messages if changes_all else topic_messages[30:31]:
+        change(entry)
     bag = logs.write_bag(tmp_path / "bag", recorded)
-    made = scenario_from_log(bag, tmp_path / "site.scenario.yaml", ReconstructionOptions())
-    load_scenario(made.file, tmp_path)
-    assert any(text in unknown for unknown in made.contents.unknowns)
-    (only,) = made.contents.goals
+    reconstruction = scenario_from_log(bag, tmp_path / "site.scenario.yaml", ReconstructionOptions())
+    load_scenario(reconstruction.file, tmp_path)
+    assert any(text in unknown for unknown in reconstruction.contents.unknowns)
+    (goal_found,) = reconstruction.contents.goals
     # Without a pose in the map frame, the goal is where the odometry ends.
     goal, tolerance = ((GOAL[0] - 1.0, GOAL[1] - 3.0), 0.2) if topic == "/amcl_pose" else (GOAL, 0.1)
-    assert math.dist(only.pose[:2], goal) < tolerance
+    assert math.dist(goal_found.pose[:2], goal) < tolerance
 
 
 def test_a_clock_that_jumps_by_more_than_the_drive_is_refused(tmp_path):
     recorded = messages()
-    odometry_messages = [one for one in recorded if one.topic == "/odom"]
+    odometry_messages = [entry for entry in recorded if entry.topic == "/odom"]
     odometry_messages[30].message.header.stamp = logs.stamp_of(logs.BEGIN + 10**8 * logs.SECOND)
     with pytest.raises(InvalidInput, match="the stamps of the topic for `odom` jump by 99999998"):
         read_drive(logs.write_bag(tmp_path / "bag", recorded))
 
 
 def test_a_drive_across_a_country_needs_a_map(tmp_path):
-    far = [replace(one, message=logs.odometry(one.time, "odom", 1e4 * k, 0.5)) for k, one in enumerate(
-        one for one in messages() if one.topic == "/odom"
+    distant = [replace(entry, message=logs.odometry(entry.time, "odom", 1e4 * k, 0.5)) for k, entry in enumerate(
+        entry for entry in messages() if entry.topic == "/odom"
     )]  # fmt: skip
-    far[-1].message.pose.pose.position.y = 1e5
-    bag = logs.write_bag(tmp_path / "bag", far)
+    distant[-1].message.pose.pose.position.y = 1e5
+    bag = logs.write_bag(tmp_path / "bag", distant)
     with pytest.raises(InvalidInput, match="too much to build a map"):
         scenario_from_log(bag, tmp_path / "site.scenario.yaml", ReconstructionOptions())
 
