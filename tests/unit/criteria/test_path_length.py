@@ -38,9 +38,12 @@ def test_satisfied_length_has_the_position_at_the_end():
     assert path_length_finding({"max": 5.0}).tick == 960
 
 
-@pytest.mark.parametrize(("ratio", "status"), [(1.0, Status.PASS), (1.5, Status.PASS)])
-def test_a_perfect_drive_has_the_ratio_one(ratio, status):
-    assert path_length_finding({"max_ratio": ratio}).status is status
+@pytest.mark.parametrize("max_ratio", [1.0, 1.5])
+def test_a_perfect_drive_has_the_ratio_one(max_ratio):
+    finding = path_length_finding({"max_ratio": max_ratio})
+    assert finding.status is Status.PASS
+    assert finding.value == pytest.approx(4.0)  # m, as the shortest path
+    assert finding.margin == pytest.approx(4.0 * (max_ratio - 1.0))
 
 
 @pytest.mark.parametrize(("shortest", "status"), [(4.0, Status.INCONCLUSIVE), (3.5, Status.FAIL)])

@@ -86,6 +86,5 @@ def test_a_found_failure_is_shrunk_in_sixty_runs(name: str, is_quick: bool) -> N
         assert threshold - float(plant(np.array(values))) <= 0.5 * margin
         run_counts.append(runs.runs)
         remaining_counts.append(sum(value != NOMINAL for value in values))
-    print(name, statistics.median(run_counts), max(run_counts), statistics.mean(remaining_counts))
     assert statistics.median(run_counts) <= 60
     assert max(remaining_counts) <= MAX_REMAINING_PARAMETERS[name]
