@@ -55,7 +55,7 @@ def _unreachable_goal(case: Case, goal: Goal) -> list[str]:
         return []
     needed = 2 * case.inscribed_radius
     narrow = [passage for passage in case.passages if passage.goal == goal.name and passage.width < needed]
-    where = f"; too narrow is {narrow[0].description}" if narrow else ""
+    where = f"; {narrow[0].description} is too narrow" if narrow else ""
     return [f"the world has no path to goal {goal.name} for a robot {needed:.2f} m wide{where}"]
 
 

@@ -138,8 +138,8 @@ class MppiPathFollowCritic(MppiCritic):
     cost_weight: Weight = 5.0
     """Weight of the distance in meters."""
     offset_from_furthest: PointCount = 5
-    """Number of plan points, 5 cm apart, from the furthest plan point that any trajectory reaches to the target point.
-    Blocked points are skipped."""
+    """Number of plan points, 5 cm apart, between the target point and the furthest plan point that any trajectory
+    reaches. Blocked points are skipped."""
     threshold_to_consider: NonNegativeLength = 1.4
     """Distance from the end of the plan within which the critic is inactive."""
 
@@ -151,7 +151,8 @@ class MppiPathAngleCritic(MppiCritic):
     cost_weight: Weight = 2.0
     """Weight of the angle in rad."""
     offset_from_furthest: PointCount = 4
-    """Number of plan points from the furthest point that any trajectory reaches to the target point."""
+    """Number of plan points, 5 cm apart, between the target point and the furthest plan point that any trajectory
+    reaches."""
     threshold_to_consider: NonNegativeLength = 0.5
     """Distance from the end of the plan within which the critic is inactive."""
     max_angle_to_furthest: NonNegativeAngle = 1.0

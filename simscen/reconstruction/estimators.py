@@ -43,6 +43,8 @@ from simscen.run.live_world.pedestrians import PedestrianMap
 
 MAX_SCANS = 3000
 """Maximum number of scans that are compared with the world. In longer drives, every second, third, … scan is used."""
+MIN_SCANS = 3
+"""Minimum number of scans from which objects and faults of the lidar are estimated."""
 SENSORS = ("lidar", "odom", "imu")
 """Names of sensors in the faults that the estimators return. The names in the robot file can differ."""
 NEVER_ESTIMATED = "doors that open or close, pushes, slippery floor, and changes of the payload; add them by hand"
@@ -121,18 +123,19 @@ def _faults_and_objects_of_scans(
     `is_calibrated` states that poses and walls are exact. Only then, errors of the mount and the ranges are estimated.
     """
     scans = drive.scans
-    if scans is None or len(scans) < 3:
-        unknowns.append("objects that are not on the map, and faults of the lidar, because the log has no scans")
+    if scans is None or len(scans) < MIN_SCANS:
+        found = "no" if scans is None else "too few"
+        unknowns.append(f"objects that are not on the map, and faults of the lidar, because the log has {found} scans")
         return [], [*other_robots]
     faults = [*stream_faults("lidar", scans.times, scans.arrivals, drive.duration, recording_gaps(drive))]
     faults += stuck_scans(scans, drive.duration)
     scans = scans_with_pose(drive, scans)
-    if len(scans) < 3:
+    if len(scans) < MIN_SCANS:
         return faults, [*other_robots]
     if len(scans) > MAX_SCANS:
-        step = -(-len(scans) // MAX_SCANS)
+        count, step = len(scans), -(-len(scans) // MAX_SCANS)
         scans = scans.subset(slice(None, None, step))
-        unknowns.append(f"what only some scans show: of the {step * len(scans)} scans, every {step}th was used")
+        unknowns.append(f"details that only some scans show: one of every {step} of the {count} scans was used")
     compared = compare_scans(drive, scans, world)
     if is_calibrated:
         error = mount_error(compared, world)
@@ -171,7 +174,8 @@ def _unknown_reactions(objects: Sequence[FoundObject]) -> Iterator[str]:
         yield "whether moving objects react to the robot; objects that are no pedestrians follow their recorded tracks"
     distant = [thing.name for thing in objects if thing.pedestrian is not None and not thing.pedestrian.meets_robot]
     if distant:
-        yield f"whether {', '.join(distant)} would evade the robot, which was never near; pedestrians do"
+        names = ", ".join(distant)
+        yield f"whether {names} would evade the robot, which was never near them; simulated pedestrians evade robots"
 
 
 def _find_kidnaps(drive: RecordedDrive) -> Iterator[tuple[float, Pose2, Reason]]:

@@ -117,12 +117,10 @@ def _write_valid_scenario(
             for thing in estimated.objects
             if thing.name not in omitted
         ]
-        unknowns = [
-            f"how {name} fits, which was left out because it makes the scenario invalid" for name in sorted(omitted)
-        ]
+        unknowns = [f"a valid place of {name}, which is left out" for name in sorted(omitted)]
         estimated = replace(estimated, objects=objects, unknowns=[*estimated.unknowns, *unknowns])
     if errors:
-        unknowns = [f"what to correct, so that the scenario can run: {error}" for error in errors]
+        unknowns = [f"the cause of an error, which you must correct before a run: {error}" for error in errors]
         estimated = replace(estimated, unknowns=[*estimated.unknowns, *sorted(unknowns)])
         contents = scenario_contents(drive, given, estimated, name, log.name)
         out.write_text(scenario_text(contents), encoding="utf-8")
@@ -135,7 +133,9 @@ def _without_invalid_faults(estimated: EstimatedParts, problems: list[Problem]) 
     invalid = [fault for fault in estimated.faults if f"fault `{fault.kind}` does not fit `{fault.target}`" in messages]
     if not invalid:
         raise InvalidInput(problems)
-    unknowns = [f"how to write the fault that {fault.target} has: {fault.reason.comment}" for fault in invalid]
+    unknowns = [
+        f"a valid form of a fault of {fault.target}, which is left out: {fault.reason.comment}" for fault in invalid
+    ]
     faults = [fault for fault in estimated.faults if fault not in invalid]
     return replace(estimated, faults=faults, unknowns=[*estimated.unknowns, *unknowns])
 

@@ -12,8 +12,10 @@ from simscen.stack.protocols import CostmapView, NavigationFailure
 
 MAX_COSTLY_RATIO = 0.5
 """Maximum share of a straight path that is replaced by a detour around costly cells (see `straight_path`)."""
-MARGIN_BEHIND_M, MARGIN_AROUND_M = 2.0, 2.0
-"""Margins of the part of the costmap in which a detour is planned: behind the costly cells, and around both ends."""
+DETOUR_END_DISTANCE_M = 2.0
+"""Distance along the straight line from the last costly cell to the end of the detour."""
+CROP_MARGIN_M = 2.0
+"""Margin around the start and the end of the detour of the part of the costmap in which the detour is planned."""
 MAX_COST_RATIO = 1.01
 """Maximum ratio of the cost of a path with a detour to the straight distance."""
 PlanPart = Callable[[CostmapView, Pose2], tuple[Array, float]]
@@ -30,11 +32,11 @@ def straight_path(costmap: CostmapView, start: Pose2, goal: Pose2, radius: float
     costly = costly_distance(costmap, start, goal, radius)
     if costly == 0.0:
         return np.array((start[:2], goal[:2]))
-    if costly + MARGIN_BEHIND_M > MAX_COSTLY_RATIO * length:
+    if costly + DETOUR_END_DISTANCE_M > MAX_COSTLY_RATIO * length:
         return None
-    ratio = (costly + MARGIN_BEHIND_M) / length
+    ratio = (costly + DETOUR_END_DISTANCE_M) / length
     part_goal = Pose2(start.x + ratio * (goal.x - start.x), start.y + ratio * (goal.y - start.y))
-    part = crop_costmap(costmap, start, part_goal, MARGIN_AROUND_M)
+    part = crop_costmap(costmap, start, part_goal, CROP_MARGIN_M)
     if part is None:
         return None
     try:
@@ -48,8 +50,8 @@ def straight_path(costmap: CostmapView, start: Pose2, goal: Pose2, radius: float
 def costly_distance(costmap: CostmapView, start: Pose2, goal: Pose2, radius: float) -> float:
     """Return the distance in m from the start to the end of the last costly cell on the straight line to the goal.
 
-    Cells are costly if they are not free or within `radius` m of an obstacle. Returns 0 without such cells, and inf if
-    the line leaves the costmap.
+    A cell is costly if its cost is not 0, or if an obstacle is within `radius` m. Returns 0 without costly cells, and
+    inf if the line leaves the costmap.
     """
     columns, rows, leaving_ratios = _cells_on_line(costmap, start, goal)
     height, width = costmap.costs.shape

@@ -103,7 +103,7 @@ _EXTENDS: Schema = {
 
 
 class _Generator(GenerateJsonSchema):
-    """Schema generator that also requires exactly one main key of a Choice, and describes models of single values.
+    """Schema generator that requires exactly one main key of a Choice, and describes the values of root models.
 
     The generator adds simscen's types that are registered as entry points.
     """
@@ -150,9 +150,9 @@ class _InstalledTypesGenerator(_Generator):
 
 
 def _with_options(union: Schema, names: list[str], mappings: list[Schema]) -> Schema:
-    """Return the schema of a union with more options: texts `names`, and `mappings` as references to their schemas.
+    """Return the schema `union` with further options: the strings `names`, and the references `mappings`.
 
-    A union is an `enum` of names, a `oneOf` of references to mappings, or a `oneOf` of both kinds.
+    A union is an `enum` of names, a `oneOf` of references to schemas of mappings, or a `oneOf` of both.
     """
     if "enum" in union:
         return {**union, "enum": [*union["enum"], *names]}

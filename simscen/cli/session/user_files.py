@@ -21,7 +21,7 @@ def create_file(file: Path, name: str) -> Iterator[None]:
     except FileExistsError:
         raise UsageError(f"{file} already exists; choose another name") from None
     except (OSError, ValueError) as error:
-        reason = os_error_reason(error) if isinstance(error, OSError) else "the name cannot be a path"
+        reason = os_error_reason(error) if isinstance(error, OSError) else "a path cannot contain this character"
         raise UsageError(f"cannot write {name!r}: {reason}") from None
     try:
         yield
@@ -33,7 +33,7 @@ def create_file(file: Path, name: str) -> Iterator[None]:
 
 
 def require_writable(path: Path, inputs: Iterable[Path] = ()) -> None:
-    """Create the folder of an output file. Raises UsageError if the file is not writable, or one of the `inputs`."""
+    """Create the folder of an output file. Raises UsageError if it cannot be written or is an input."""
     try:
         require_not_input(path, inputs)
         path.parent.mkdir(parents=True, exist_ok=True)

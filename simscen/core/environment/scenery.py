@@ -105,7 +105,7 @@ class Scenery:
 
     `places` are named poses, and `things` are movable objects. `ground` contains ramps and other drivable surfaces,
     `floors` the regions with changed friction, and `zones` the zones and masks of costmap filters. `map` is the map of
-    the world; None if every robot receives this map.
+    the world; None if it equals the maps of all robots, which are in the header of the log, too.
     """
 
     places: Mapping[str, Pose2] = field(default_factory=dict)

@@ -117,7 +117,7 @@ def goals_after_a_failure(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 @MEANING.check("SC052", severity="warning")
 def loose_bounds(loaded: LoadedScenario) -> Iterator[CheckProblem]:
-    """Find bounds that hardly any run can violate, because of physics or the time limit."""
+    """Find bounds that hardly any run can violate, because of physics, the time limit, or the timeouts of goals."""
     limit = loaded.spec.time_limit
     for index, entry in enumerate(loaded.spec.pass_):
         found = list(_loose_bounds_of(loaded, entry.kind, entry.chosen))
@@ -130,7 +130,7 @@ def loose_bounds(loaded: LoadedScenario) -> Iterator[CheckProblem]:
 
 
 def _loose_bounds_of(loaded: LoadedScenario, kind: str, criterion: Any) -> Iterator[tuple[str, str]]:
-    """Yield the key and the reason of each loose bound of a criterion. Bounds in TIME_BOUNDS are left out."""
+    """Yield the key and the reason of each loose bound of a criterion. The time limit is not considered."""
     robot = loaded.robot.spec
     match kind:
         case "speed" if robot is not None:

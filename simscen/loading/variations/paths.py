@@ -108,11 +108,11 @@ def _resolve_keys(path: str, parts: list[str], tree: MappingNode) -> Keys:
 
 
 def _item_keys(path: str, keys: list[Key], items: SequenceNode, part: str, next_parts: list[str]) -> list[Key]:
-    """Return the index of the item that `part` of a path selects in the list `items` at `keys`.
+    """Return the keys that `part` of a path selects in the list `items` at `keys`: [index], or [index, kind].
 
-    If `part` is the kind of a criterion or metric, the index is followed by the kind, unless the path continues with a
-    key of the item itself. `next_parts` are the parts of the path after `part`. Raises PathError if no item or several
-    items match.
+    The kind of a criterion or metric follows if the path continues with a key of the kind: `pass.clearance.min` leads
+    to `pass[0].clearance.min`, but `pass.clearance.severity` to `pass[0].severity`. `next_parts` are the parts of the
+    path after `part`. Raises PathError if no item or several items match.
     """
     holder = dotted_path(keys)
     if part.isascii() and part.isdecimal():

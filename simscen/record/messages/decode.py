@@ -32,7 +32,7 @@ NO_COVARIANCE: Numbers = (0.0,) * 6
 
 
 class InvalidOrientation(ValueError):
-    """The orientation of a pose in a message is not a quaternion of length 1."""
+    """The length of the quaternion of a pose in a message is far from 1."""
 
     def __init__(self) -> None:
         super().__init__("an orientation is not a quaternion of length 1")
@@ -68,7 +68,7 @@ class MessageReader(Reader):
     def pose(self) -> Numbers:
         """Return x, y, z and the quaternion of a geometry_msgs/msg/Pose or Transform.
 
-        Raises InvalidOrientation if the length of the quaternion is not 1. A quaternion with nan is allowed.
+        Raises InvalidOrientation if the length of the quaternion is far from 1. A quaternion with nan is allowed.
         """
         pose = self.take("7d")
         if abs(math.hypot(*pose[3:]) - 1.0) > _MAX_QUATERNION_NORM_ERROR:
@@ -87,7 +87,10 @@ class CheckedReader(MessageReader):
         return self.string().lstrip("/").removeprefix(self.frame_prefix)
 
     def pose(self) -> Numbers:
-        """Return the next pose with a normalized quaternion. Raises InvalidOrientation unless its length is 1."""
+        """Return the next pose with a normalized quaternion.
+
+        Raises InvalidOrientation if the length of the quaternion in the message is far from 1, or nan.
+        """
         pose = self.take("7d")
         norm = math.hypot(*pose[3:])
         if not abs(norm - 1.0) < _MAX_QUATERNION_NORM_ERROR:

@@ -69,7 +69,7 @@ def _goal_mark(outcome: GoalOutcome, scene: Scene) -> GoalMark:
             findings = [finding for verdict in verdicts for finding in verdict.findings]
             if any(f.status is Status.FAIL and f.what == f"goal {outcome.goal.name}" for f in findings):
                 return GoalMark(
-                    "failed", palette.RED, "reached unexpectedly" if outcome.expected_failure else "not there"
+                    "failed", palette.RED, "reached unexpectedly" if outcome.expected_failure else "robot elsewhere"
                 )
             return GoalMark("reached", palette.GREEN)
 

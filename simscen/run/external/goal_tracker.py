@@ -118,14 +118,17 @@ class GoalTracker:
         self._events += self._task.accept_next(tick)
 
     def _require_current(self, kind: str, name: str) -> None:
-        """Raise ProtocolViolation unless a report names the current goal, or no goal."""
+        """Raise ProtocolViolation if no goal is active, or if the report has the name of another goal.
+
+        An empty name stands for the current goal.
+        """
         goal = self._task.goal
         if goal is None or name not in ("", goal.name):
             active = "no goal is active" if goal is None else f"the current goal is `{goal.name}`"
             raise ProtocolViolation(f"{kind} `{name[:60]}`, but {active}")
 
     def _cancel_goal(self, tick: int, name: str) -> None:
-        """Process the cancellation of a goal. Ignores goals that were dropped before."""
+        """Process the cancellation of a goal. Ignores goals that were preempted or timed out before."""
         goal = self._task.goal
         if name in self._dropped_goals and (goal is None or goal.name != name):
             self._dropped_goals.discard(name)

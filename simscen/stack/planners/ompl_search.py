@@ -80,7 +80,7 @@ class _CostBeyondLengthObjective(ob.OptimizationObjective):  # type: ignore[misc
 
 
 class _MotionCostObjective(ob.PathLengthOptimizationObjective):  # type: ignore[misc] # ompl has no types
-    """Objective: the cost of a motion. Derived from the path length, because OMPL then supports informed sampling."""
+    """Objective: the cost of a motion. Derived from OMPL's path length, so that OMPL supports informed sampling."""
 
     def __init__(self, information: Any, motion_cost: MotionCost) -> None:
         super().__init__(information)
@@ -198,7 +198,11 @@ class OmplSearch:
         return information
 
     def _make_objective(self, information: Any) -> Any:
-        """Return the objective: the cost of motions. If possible, OMPL's path length is a separate part, for speed."""
+        """Return the objective: the cost of motions.
+
+        For speed, it is the sum of OMPL's path length, which OMPL computes in C++, and the cost beyond the length.
+        Informed RRT* needs one objective that is derived from the path length.
+        """
         motion_cost = self.problem.motion_cost
         if self.spec.type == "informed_rrt_star":
             objective = _MotionCostObjective(information, motion_cost)
@@ -245,9 +249,9 @@ def _state(information: Any, point: Point) -> Any:
 
 
 def stop_after(iterations: int, is_done: Termination = lambda: False, min_iterations: int = 0) -> Termination:
-    """Return a termination condition: `iterations`, or at least `min_iterations` if `is_done` returns True.
+    """Return a condition that ends a search after `iterations` iterations, or earlier if `is_done` returns True.
 
-    `is_done` is called once per `CHECK_PERIOD_ITERATIONS` iterations.
+    The search has at least `min_iterations` iterations. `is_done` is called once per CHECK_PERIOD_ITERATIONS.
     """
 
     def answers() -> Iterator[Iterable[bool]]:

@@ -72,10 +72,13 @@ def apply_limits(sequence: Floats, current: Floats, limits: VelocityLimits, dt: 
 
 
 def _limit_axis(
-    requested: list[float], current: float, bounds: tuple[float, float], changes: tuple[float, float]
+    requested: list[float], current: float, bounds: tuple[float, float], speed_changes: tuple[float, float]
 ) -> list[float]:
-    """Return the velocities of one axis within `bounds` (low, high), with at most `changes` (up, down) per step."""
-    (low, high), (up, down) = bounds, changes
+    """Return the velocities of one axis within `bounds` (low, high).
+
+    In each step, the speed rises by at most `speed_changes[0]`, and falls by at most `-speed_changes[1]`.
+    """
+    (low, high), (up, down) = bounds, speed_changes
     limited, last = [current], current
     for velocity in requested[1:]:
         target = low if velocity < low else min(velocity, high)

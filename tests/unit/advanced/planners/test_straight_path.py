@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from simscen.advanced.planners.straight_path import MARGIN_BEHIND_M, costly_distance, straight_path
+from simscen.advanced.planners.straight_path import DETOUR_END_DISTANCE_M, costly_distance, straight_path
 from simscen.core.geometry import Array, Pose2
 from simscen.core.messages.navigation import ErrorCode
 from simscen.model.planners import OmplPlanner as PlannerSpec
@@ -104,7 +104,7 @@ def test_detour_around_costly_cells_is_taken_only_if_cheap(
         return np.array((start[:2], (part_goal.x, part_goal.y + lateral_error))), start.distance(part_goal) + detour_m
 
     points = straight_path(view_of(costs), start, goal, ROBOT_RADIUS_M, plan_detour)
-    assert goals[0][:2] == pytest.approx((x + 1.5 + MARGIN_BEHIND_M, y + 1.0))
+    assert goals[0][:2] == pytest.approx((x + 1.5 + DETOUR_END_DISTANCE_M, y + 1.0))
     assert (points is not None) == is_accepted
     if points is not None:
         assert points.tolist() == [list(start[:2]), list(goals[0][:2]), list(goal[:2])]

@@ -30,7 +30,7 @@ def test_unreachable_goal_names_the_passage_that_is_too_narrow():
     gap = ["study", [5, 0.15], [5, -0.15], "west wall", "east wall"]
     (line,) = why("result", [], case={**CASE, "shortest": {"study": float("inf")}, "passages": [gap]})
     assert line.endswith(
-        "a robot 0.40 m wide; too narrow is the passage of 0.30 m between `west wall` and `east wall` at (5.00, 0.00)"
+        "a robot 0.40 m wide; the passage of 0.30 m between `west wall` and `east wall` at (5.00, 0.00) is too narrow"
     )
 
 
