@@ -12,6 +12,7 @@ from simscen.core.records.events import Event, EventKind
 from simscen.core.records.trace import Samples
 from simscen.core.records.verdict import Status
 from simscen.criteria.clearance import PersonalSpace
+from simscen.criteria.findings import InvalidTrace
 from simscen.criteria.trace_signals.catalog import read_signal
 from simscen.criteria.trace_signals.distances import pedestrian_gap, pedestrian_radii
 from simscen.testing.synthetic_trace import synthetic_case, synthetic_trace
@@ -77,3 +78,10 @@ def test_deviation_does_not_depend_on_the_headings_of_a_plan():
     plan = Path(np.array([[0.0, 1.0, np.nan], [5.0, 1.0, np.nan]]), 0)
     trace = replace(synthetic_trace({"seconds": 2, "truth": [[0, 2, 0]]}), plans=(plan,))
     assert read_signal("plan_deviation", trace, synthetic_case({}), {}).tolist() == [1.0] * len(trace.truth)
+
+
+def test_a_plan_with_a_single_invalid_coordinate_is_an_error():
+    plan = Path(np.array([[0.0, 1.0, 0.0], [5.0, np.nan, 0.0]]), 0)
+    trace = replace(synthetic_trace({"seconds": 2, "truth": [[0, 2, 0]]}), plans=(plan,))
+    with pytest.raises(InvalidTrace, match=r"the plan is not finite at t = 0.00 s"):
+        read_signal("plan_deviation", trace, synthetic_case({}), {})
