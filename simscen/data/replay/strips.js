@@ -31,7 +31,7 @@ export class StripView {
 
   /** Return the text of the value of the signal at a time. */
   tell(seconds) {
-    const unit = this.about.unit && !this.about.asks ? ` ${this.about.unit}` : "";
+    const unit = this.about.unit && !this.about.is_boolean ? ` ${this.about.unit}` : "";
     this.value.textContent = this.lines.map(({ run, strip }) => shown(strip, strip.at(run.tick(seconds)))).join(" · ") + unit;
   }
 
@@ -49,8 +49,8 @@ export class StripView {
   #measure() {
     const found = this.lines.map(({ strip }) => finiteExtremes(strip.samples)).filter(Boolean), bounds = this.limits.map((limit) => limit.value);
     const all = [...found.flatMap(({ least, most }) => [least, most]), ...bounds];
-    this.least = Math.min(...all, this.about.asks ? 0 : Infinity);
-    this.most = Math.max(...all, this.about.asks ? 1 : -Infinity);
+    this.least = Math.min(...all, this.about.is_boolean ? 0 : Infinity);
+    this.most = Math.max(...all, this.about.is_boolean ? 1 : -Infinity);
     if (this.least > 0 && this.least < this.most / 2) this.least = 0;
     if (this.most - this.least < 1e-9) [this.least, this.most] = [this.least - 0.5, this.most + 0.5];
   }
@@ -60,7 +60,7 @@ export class StripView {
       const y = v(limit.value), bad = limit.status !== "pass";
       c.fillStyle = bad ? colors.bad : colors.faint;
       c.globalAlpha = bad ? 0.14 : 0.1;
-      if (limit.least) c.fillRect(0, y, width, HEIGHT - y);
+      if (limit.is_minimum) c.fillRect(0, y, width, HEIGHT - y);
       else c.fillRect(0, 0, width, y);
       c.globalAlpha = 1;
       c.strokeStyle = bad ? colors.bad : colors.faint;
@@ -75,7 +75,7 @@ export class StripView {
       c.font = "10px system-ui, sans-serif";
       c.textAlign = "right";
       c.textBaseline = y < HEIGHT / 2 ? "top" : "bottom";
-      c.fillText(`${limit.least ? "≥" : "≤"} ${Number(limit.value.toPrecision(3))}`, width - 3, y + (y < HEIGHT / 2 ? 2 : -1));
+      c.fillText(`${limit.is_minimum ? "≥" : "≤"} ${Number(limit.value.toPrecision(3))}`, width - 3, y + (y < HEIGHT / 2 ? 2 : -1));
     }
   }
 
@@ -112,7 +112,7 @@ export class StripView {
 function boundsOf(name, runs) {
   const found = new Map();
   for (const limit of runs.flatMap((run) => run.robots.flatMap((robot) => robot.limits))) {
-    const key = `${limit.value} ${limit.least}`;
+    const key = `${limit.value} ${limit.is_minimum}`;
     if (limit.signal === name && (!found.has(key) || limit.status !== "pass")) found.set(key, limit);
   }
   return [...found.values()];
@@ -123,7 +123,7 @@ function finiteExtremes(values) {
 }
 
 function shown(strip, value) {
-  if (strip.asks) return value ? "yes" : "no";
+  if (strip.is_boolean) return value ? "yes" : "no";
   if (!Number.isFinite(value)) return value > 0 ? "far" : "–";
   const digits = Math.abs(value) >= 100 ? 0 : Number.isInteger(value) && !strip.unit ? 0 : 2;
   return value.toFixed(digits);

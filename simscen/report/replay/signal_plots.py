@@ -89,7 +89,7 @@ def _plot_data(
         "name": title,
         "text": signal.text,
         "unit": signal.unit,
-        "asks": signal.is_boolean,
+        "is_boolean": signal.is_boolean,
         "ticks": columns.add(trace.truth.ticks[indices]) if len(indices) < len(values) else None,
         "values": columns.add(values[indices], _step(signal.unit, values)),
     }
@@ -112,7 +112,7 @@ def _limit(verdict: Verdict, finding: Finding) -> dict[str, Any] | None:
         return None
     is_minimum = relation in ("≥", ">")
     name = _SIGNAL_OF_CRITERION.get((verdict.criterion, finding.unit)) or finding.what.partition(" ")[0]
-    if name not in SIGNALS or SIGNALS[name].unit != finding.unit:  # such a margin is not a distance to the limit
-        return None
+    if name not in SIGNALS or SIGNALS[name].unit != finding.unit:
+        return None  # with `scale`, the margin has another unit than the signal, and does not give the limit
     value = finding.value - finding.margin if is_minimum else finding.value + finding.margin
-    return {"signal": name, "value": round(value, 6), "least": is_minimum} if isfinite(value) else None
+    return {"signal": name, "value": round(value, 6), "is_minimum": is_minimum} if isfinite(value) else None

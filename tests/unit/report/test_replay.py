@@ -154,7 +154,7 @@ def test_bound_is_drawn_on_its_signal() -> None:
     finding = Finding(Status.FAIL, "speed", "0.50 m/s", "≤ 0.40 m/s", -0.1, "m/s", 0.5, 240, (1.0, 0.0))
     log = make_log({"seconds": 4, "truth": [[0, 0, 0], [4, 2, 0]]}, text=TEXT)
     run = ReplayData(replay_page([(log, make_result(Verdict("speed", "speed", "fail", (finding,))))])).runs[0]
-    bound = {"signal": "speed", "value": 0.4, "least": False, "verdict": "speed", "status": "fail"}
+    bound = {"signal": "speed", "value": 0.4, "is_minimum": False, "verdict": "speed", "status": "fail"}
     assert run["robots"][0]["limits"] == [bound]
     assert run["verdicts"][0]["line"] == 13
     assert "speed" in [strip["name"] for strip in run["robots"][0]["strips"]]
