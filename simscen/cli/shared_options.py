@@ -1,4 +1,4 @@
-"""Command-line options that several commands share: options of runs, reports, and of reading logs."""
+"""Command-line options that several commands share: options for runs, for reports, and for reading logs."""
 
 from collections.abc import Collection
 from dataclasses import dataclass
@@ -24,7 +24,7 @@ class Format(str, Enum):
 
 
 class TextOrJson(str, Enum):
-    """Output format of a command without workflow commands for GitHub."""
+    """Output format of a simscen command that does not support `--format github`."""
 
     TEXT = "text"
     JSON = "json"
@@ -38,9 +38,10 @@ class JunitFamily(str, Enum):
 
 
 STACK_HELP = (
-    "Run every scenario with this stack instead of its own: a command that speaks the stack protocol, a *.stack.yaml "
-    "file, a Nav2 parameter file, `reference`, another type of stack, or a name in your configuration. With several "
-    "robots, it replaces the stack of each; but if a robot's stack is `external: NAME`, NAME='COMMAND' defines its "
+    "Run every scenario with the stack VALUE instead of its own. NAME is the name of the stack in the results. VALUE "
+    "is a command that speaks the stack protocol, a *.stack.yaml file, a Nav2 parameter file, `reference`, another "
+    "type of stack, or a name in your configuration. `--stack mine` is short for `--stack mine=mine`. With several "
+    "robots, VALUE replaces the stack of each; but if a robot's stack is `external: NAME`, NAME='COMMAND' defines its "
     "command, and the other robots keep their stacks. "
 )
 FormatOption = Annotated[Format, typer.Option("--format", help="Output format.")]
@@ -72,13 +73,13 @@ ReplayOption = Annotated[
 ]
 KeepLogsOption = Annotated[
     LogRetention,
-    typer.Option(help="`failed` keeps logs and pictures only of runs that do not pass: for thousands of runs."),
+    typer.Option(help="`failed` keeps logs and pictures only of runs that do not pass; useful for thousands of runs."),
 ]
 LenientOption = Annotated[bool, typer.Option("--lenient", help="Skip unsupported parts of SDF worlds with a warning.")]
 
 
 class BackendName(str, Enum):
-    """Where runs are executed."""
+    """Backend that executes the runs."""
 
     LOCAL = "local"
     RAY = "ray"

@@ -136,7 +136,7 @@ class GoalsReached(Spec, Criterion):
                 self._limit(outcome),
                 "m",
                 at=(trace, tick),
-                context="from the goal when the robot reported it reached",
+                context="from the goal when the robot reported it as reached",
                 detail=details,
             ),
             at_most(
@@ -145,7 +145,7 @@ class GoalsReached(Spec, Criterion):
                 self.yaw_tolerance or goal.yaw_tolerance + self.localization_yaw_margin,
                 "rad",
                 at=(trace, tick),
-                context="from the goal's heading when the robot reported it reached",
+                context="from the goal's heading when the robot reported it as reached",
                 detail=details,
             ),
         ]

@@ -85,7 +85,7 @@ class ErrorCodeIs(Spec, Criterion):
 
 
 def _last(trace: Trace, *kinds: EventKind, name: str | None = None) -> Event | None:
-    """Return the last event of these kinds with the name of goal `name`; None if there is no such event.
+    """Return the last event of these kinds that belongs to the goal `name`; None if there is no such event.
 
     If `name` is None, events with any name count.
     """
@@ -115,9 +115,9 @@ def _missing_result(trace: Trace, what: str, expected: str) -> Finding:
 class NoFalseSuccess(Spec, Criterion):
     """The robot did not report a false success. A reported failure is allowed.
 
-    What is measured: the true distance to each goal when the robot reports the goal as reached. When the robot reports
-        that navigation SUCCEEDED, also whether every goal was reached, except goals that were preempted or are expected
-        to fail.
+    What is measured: the true distance to each goal when the robot reports the goal as reached; for a via pose, the
+        distance at the closest approach. When the robot reports that navigation SUCCEEDED, also whether every goal was
+        reached, except goals that were preempted or are expected to fail.
     When it fails: the robot was farther than `tolerance` from a goal that it reported as reached, or it reported
         SUCCEEDED although a goal was not reached.
     Why this: a failed delivery is repeated, but a false success remains unnoticed. Arena, for example, reports
@@ -155,11 +155,11 @@ class NoFalseSuccess(Spec, Criterion):
         assert outcome.reached_tick is not None
         if outcome.goal.via:
             tick, distance = closest_approach(trace, outcome, outcomes)
-            context = "from the pose at the closest approach, which the robot reported passed"
+            context = "from the via pose at the closest approach (reported as passed)"
         else:
             tick = outcome.reached_tick
             distance = true_pose(trace, tick).distance(outcome.goal.pose)
-            context = "from the goal when the robot reported it reached"
+            context = "from the goal when the robot reported it as reached"
         return at_most(f"goal {outcome.goal.name}", distance, self.tolerance, "m", at=(trace, tick), context=context)
 
 
@@ -191,7 +191,7 @@ def _judge_success(
 def _end_index(outcome: GoalOutcome, ends: tuple[Event, ...]) -> int | None:
     """Return the index of the end of navigation to which a goal belongs; None if there is no such end.
 
-    This is the first of `ends` after the goal was accepted, or at or after the tick at which the goal ended.
+    A goal belongs to the first of `ends` that is later than the acceptance of the goal, or not earlier than its end.
     """
     end_tick = math.inf if outcome.end is None else outcome.end.tick
     return next((k for k, end in enumerate(ends) if outcome_start(outcome) < end.tick or end_tick <= end.tick), None)

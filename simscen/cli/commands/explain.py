@@ -60,7 +60,7 @@ def _topics_named(name: str) -> list[Topic]:
     Raises UsageError if nothing is found.
     """
     known = all_topics()
-    # The code of an action through poses, such as 306, has the meaning of the code for a single pose.
+    # An error code of a …ThroughPoses action, such as 306, has the meaning of the code of the …ToPose action.
     lowered = str(int(error_code(int(name)))) if name.isdecimal() else name.lower()
     found = [
         topic
