@@ -3,8 +3,8 @@
 All quantities have SI units: meters, seconds, radians, m/s, rad/s. Frames follow REP 103 and REP 105: `map`, `odom`,
 and `base_link` with x forward and y to the left. Arrays are numpy arrays of float64 unless stated otherwise.
 
-Each name is imported on first use, so that a specification does not import the physics engine. Names that are not
-listed here can change without notice.
+Each name is imported on first use, so that a module with the Spec classes of a plug-in does not import the physics
+engine. Names that are not listed here can change without notice.
 """
 
 from __future__ import annotations

@@ -97,14 +97,14 @@ class ChangedCommands(FaultEffect):
 
 
 MAX_ODOMETRY_VALUE = 1e6
-"""Odometry with a coordinate in m or a heading in rad beyond this absolute value is garbage."""
+"""Odometry with a coordinate in m or a heading in rad beyond this absolute value is implausible."""
 
 
 class OdometryDistortion(FaultEffect):
     """Effect that distorts each odometry increment, and integrates the distorted increments to a pose.
 
-    The reported pose does not jump when the fault begins. The accumulated error remains when the fault ends. Garbage
-    from another fault, such as nan, is returned unchanged, and is not part of any increment.
+    The reported pose does not jump when the fault begins. The accumulated error remains when the fault ends.
+    Implausible values from another fault, such as nan, are returned unchanged, and are not part of any increment.
     """
 
     def __init__(self, distort: Callable[[Twist, Twist, int], tuple[Twist, Twist]]) -> None:
@@ -119,7 +119,7 @@ class OdometryDistortion(FaultEffect):
         self._has_ended = False
 
     def reading(self, reading: Reading) -> Reading:
-        """Return the distorted odometry. Garbage and other readings are returned unchanged."""
+        """Return the distorted odometry. Implausible odometry and other readings are returned unchanged."""
         if not (isinstance(reading, Odometry) and all(abs(value) <= MAX_ODOMETRY_VALUE for value in reading.pose)):
             return reading
         previous, pose = self._previous.get(reading.sensor, (reading, reading.pose))

@@ -83,7 +83,11 @@ class Thinning:
         return previous.predicted is predicted and previous.row == objects.row - 1 and predicted.all_moved[objects.row]
 
     def _changed_objects(self, tick: int, objects: Mapping[str, Pose3]) -> dict[str, Pose3]:
-        """Return the poses that have changed since they were last kept, or were not kept for STANDSTILL_RATE_HZ."""
+        """Return the poses to keep.
+
+        These are the poses that have changed since they were last kept, and the poses that were last kept at least one
+        period of STANDSTILL_RATE_HZ ago.
+        """
         kept = dict[str, Pose3]()
         is_stationary = objects is self._previous_poses
         if is_stationary and tick < self._standstill_due_tick:

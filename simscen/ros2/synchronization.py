@@ -8,8 +8,8 @@
 3. Run two rounds, so that nodes receive the time and run their timers. Run more rounds until a command arrives, at most
    one per node.
 4. Without a command while the robot drives to a goal, wait for a short wall time.
-5. If a Nav2 server moves the robot and its command is due, wait for the command, at most `limit_s` of wall time. If no
-   command arrives in the next simulated second either, the run ends with an error.
+5. If a Nav2 server moves the robot and its command is overdue, wait for the command, at most `limit_s` of wall time.
+   If no command arrives in the next simulated second either, the run ends with an error.
 
 Without a command, the robot keeps its previous command. ROS time is always a multiple of the control period.
 
@@ -46,8 +46,9 @@ class LockstepSynchronization:
     ) -> List[ReceivedMessage]:
         """Publish `messages`, and return the messages of the nodes since the last step.
 
-        `now` is simulated time in ns. `is_driving` states whether the robot drives to a goal. Raises AdapterError if a
-        node sends no commands.
+        `now` is simulated time in ns. `is_command_due` states whether a control period begins: the robot needs a
+        velocity command now. Otherwise, steps 2 to 5 are skipped. `is_driving` states whether the robot drives to a
+        goal. Raises AdapterError if a node sends no commands.
         """
         graph, barrier = self._graph, self._barrier
         for topic, data in transforms_first(messages):
@@ -63,11 +64,11 @@ class LockstepSynchronization:
                 break
         if is_driving:
             graph.spin_until(lambda: _last_command(graph.inbox[start:]) is not None, self._wait)
-            self._wait_for_due_command(now, start)
+            self._wait_for_overdue_command(now, start)
         self._count(now, _last_command(graph.inbox[start:]))
         return _take_inbox(graph)
 
-    def _wait_for_due_command(self, now: int, start: int) -> None:
+    def _wait_for_overdue_command(self, now: int, start: int) -> None:
         """Perform step 5. `start` is the index of the first message of this period in the inbox."""
 
         def late_server() -> List[str]:
@@ -108,7 +109,8 @@ class PacedSynchronization:
     ) -> List[ReceivedMessage]:
         """Wait until the wall time of the step, publish `messages`, and return the messages of the nodes.
 
-        `now` is simulated time in ns.
+        `now` is simulated time in ns. `is_command_due` states whether a control period begins: the robot needs a
+        velocity command now.
         """
         elapsed = now / NS_PER_S / self._factor
         start = time.monotonic() - elapsed

@@ -93,7 +93,10 @@ class Simulation:
         self._stepper.step(ticks)
 
     def call_before_steps(self, period: int, function: Callable[[], None]) -> None:
-        """Call `function` before each step that begins at a multiple of `period` ticks. Replaces the last function."""
+        """Call `function` before each step that begins at a multiple of `period` ticks.
+
+        Replaces the previous function.
+        """
         self._stepper.call_before_steps(period, function)
 
     # Changing the world

@@ -209,7 +209,10 @@ class FreeSpaceMemory:
         self._scans.append(EarlierScan(scan.tick, lidar, geometry, padded, free))
 
     def scan_before(self, tick: int) -> EarlierScan | None:
-        """Return the scan about PREFERRED_AGE_S before a tick; None if no scan is at least MIN_AGE_S before it."""
+        """Return the scan about PREFERRED_AGE_S before a tick; None if no scan is at least MIN_AGE_S before it.
+
+        Older scans are dropped, so the ticks of consecutive calls must not decrease.
+        """
         scans, latest = self._scans, tick - self._preferred_age
         while len(scans) > 1 and scans[1].tick <= latest:
             scans.popleft()

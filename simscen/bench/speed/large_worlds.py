@@ -53,7 +53,7 @@ class WorldCost:
     simulated:    simulated time of a run in s
     milliseconds: CPU time per simulated second in ms
     preparing:    CPU time in s to load and prepare the scenario, once for all runs
-    memory:       maximum memory of this process since its start in MB
+    memory:       maximum memory of this process since its start, in MB
     """
 
     name: str
@@ -184,7 +184,7 @@ def _box_or_drum(number: int) -> str:
 
 
 def write_arena(folder: Path) -> Path:
-    """Write a ROS map of 100 x 100 m with 400 blocks and some single occupied cells; return its scenario file."""
+    """Write a ROS map of 100 x 100 m with 400 blocks and 0.5 % of single cells occupied; return its scenario file."""
     folder.mkdir()
     rng = np.random.default_rng(7)
     cells = np.full((MAP_SIDE_CELLS, MAP_SIDE_CELLS), FREE, dtype=np.int8)

@@ -205,7 +205,7 @@ def _spline_pose(path: MotionPath, k: int, part: float) -> Pose2:
 
 
 def _spline_velocity(path: MotionPath, k: int) -> XYYaw:
-    """Return the velocity of a spline at pose k in m/s and rad/s (Catmull-Rom)."""
+    """Return the velocity of a spline at pose k in m/s and rad/s (Catmull-Rom); zero at both ends, except in a loop."""
     last = len(path.poses) - 1
     if 0 < k < last:
         before, after = k - 1, k
@@ -230,7 +230,7 @@ def _max_distance(step: XYYaw, reach: float) -> float:
 
 
 def _fold_repetitions(path: MotionPath, seconds: float) -> float:
-    """Return the time in the first pass of the path at which the body has the same pose as at a path time in s."""
+    """Return the path time within the first pass at which the pose is the same as at the path time `seconds`."""
     first, duration = path.times[0], path.times[-1] - path.times[0]
     elapsed = seconds - first
     if duration <= 0 or elapsed <= 0 or path.mode == "once":

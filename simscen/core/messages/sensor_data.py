@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 PoseCovariance = tuple[float, float, float, float, float, float, float, float, float]
 """Covariance of x, y (m) and yaw (rad), row by row."""
 UNKNOWN_POSE_COVARIANCE: PoseCovariance = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-"""Covariance of an unknown pose: all zeros, as in ROS."""
+"""Covariance of a pose whose uncertainty is unknown: all zeros, as in ROS."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +54,7 @@ class Scan:
         return self.angle_min + self.angle_increment * np.arange(len(self.ranges), dtype=np.float64)
 
     def points(self) -> Array:
-        """Return x and y of the valid hits (m, 2) in the base frame. Ranges outside of the limits are left out."""
+        """Return x and y (k, 2) of the valid hits in m in the base frame. Ranges outside of the limits are left out."""
         hit = np.isfinite(self.ranges) & (self.ranges >= self.range_min) & (self.ranges <= self.range_max)
         angles, ranges = self.angles()[hit], self.ranges[hit]
         flat = np.column_stack((ranges * np.cos(angles), ranges * np.sin(angles)))
@@ -126,7 +126,10 @@ Readings = tuple[Reading, ...]
 
 
 MIN_HEIGHT_M = 0.05
-"""Minimum height above the ground of hits that `level_scan` uses, or half the height of the lidar if it is lower."""
+"""Minimum height above the ground of hits that `level_scan` uses.
+
+For a lidar lower than twice this height, the minimum is half the height of the lidar.
+"""
 MAX_HEIGHT_M = 2.0
 """Maximum height above the ground of hits that `level_scan` uses: `max_obstacle_height` of Nav2's costmap."""
 
@@ -135,8 +138,9 @@ def level_scan(scan: Scan) -> Scan:
     """Convert the scan of a tilted lidar to the scan of a level lidar at the same position.
 
     As in pointcloud_to_laserscan, each level beam gets the nearest hit in its direction. Hits below MIN_HEIGHT_M, above
-    MAX_HEIGHT_M, or outside the angles of the level scan are ignored. The range is inf in directions in which
-    nothing was hit, and nan in directions without a measurement, or in which all hits are ignored.
+    MAX_HEIGHT_M, or outside the angles of the level scan are ignored. A hit closer than `range_min` (-inf) counts as
+    the nearest. The range is inf in directions in which nothing was hit, and nan in directions without a measurement,
+    or in which all hits are ignored.
     A scan without `tilted_mount` is returned unchanged.
     """
     if scan.tilted_mount is None:
@@ -179,7 +183,7 @@ def _level_beams(
 
     The arrays contain the index of the level beam in the same direction (`count` if there is none), and the horizontal
     and vertical components of the unit vector along the tilted beam. The tilted beams have the angles `first` + k
-    `increment` in rad.
+    `increment` in rad. `yaw` is the heading of the level lidar in the base frame.
     """
     rotation = mount.rotation()
     angles = first + increment * np.arange(count, dtype=np.float64)

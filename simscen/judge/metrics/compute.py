@@ -32,7 +32,7 @@ MAX_STANDING_SPEED_M_S, MAX_STANDING_TURN_RATE_RAD_S = 0.01, 0.02
 """Speed and absolute turn rate below which a robot stands still."""
 
 BARN_OPTIMAL_SPEED_M_S = 2.0
-"""Mean speed of a robot that needs the optimal time of the BARN score."""
+"""Mean speed from which the optimal time of the BARN score is computed."""
 
 PERSON_SPACES = {
     "intimate": (0.0, INTIMATE_SPACE_M),

@@ -25,8 +25,10 @@ WALL_COLOR, UNKNOWN_COLOR, NEW_HIT_COLOR = (112, 117, 128, 255), (128, 133, 144,
 MAX_WALL_DISTANCE_M = 0.15
 """Maximum distance between a wall and a lidar return from the wall."""
 TARGET_SCANS, TARGET_POINTS = 300, 600
-"""Minimum number of drawn scans, and of drawn points of a line. If there are at least twice as many, some are left
-out."""
+"""Numbers of scans, and of points of a line, to which a drawing is thinned.
+
+At least this many are drawn, and fewer than twice as many. Shorter data is drawn completely.
+"""
 MAX_TIME_MARKS, MIN_MARK_DISTANCE_FRACTION = 12, 0.06
 """Maximum number of time marks on a path, and minimum distance of marks as a fraction of the larger side of the map."""
 MARGIN_M, MIN_ASPECT = 1.0, 0.45
@@ -137,7 +139,7 @@ def _time_marks(drive: RecordedDrive, css_class: str, box: Box) -> Iterator[str]
 
 
 def _object_shapes(thing: FoundObject, box: Box) -> Iterator[str]:
-    """Yield the path of a moving object or the outline of a standing object, and its name."""
+    """Yield the path of a moving object or the outline of a stationary object, and its name."""
     _, x, y, yaw = thing.keyframes[0]
     if thing.is_moving:
         yield f'<polyline class="object" points="{_svg_points(np.array(thing.keyframes)[:, 1:3])}"/>'

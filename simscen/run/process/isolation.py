@@ -39,10 +39,10 @@ def limit_memory() -> None:
     set_soft_limit(resource.RLIMIT_CORE, 0)
 
 
-def set_soft_limit(limit: int, maximum: int) -> None:
+def set_soft_limit(resource_id: int, maximum: int) -> None:
     """Set the soft limit of a resource to `maximum`, or to the hard limit if the hard limit is lower."""
-    hard = resource.getrlimit(limit)[1]
-    resource.setrlimit(limit, (maximum if hard == resource.RLIM_INFINITY else min(maximum, hard), hard))
+    hard = resource.getrlimit(resource_id)[1]
+    resource.setrlimit(resource_id, (maximum if hard == resource.RLIM_INFINITY else min(maximum, hard), hard))
 
 
 def limit_resources() -> None:

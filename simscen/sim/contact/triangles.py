@@ -7,7 +7,10 @@ import numpy as np
 from simscen.core.geometry import Array, Vector
 
 LINE_TILT = 0.0123, 0.0271
-"""Slopes dx/dz and dy/dz of the line in `encloses_along_line`. The tilt avoids hits of vertical edges, as in maps."""
+"""Slopes dx/dz and dy/dz of the line in `encloses_along_line`.
+
+The tilt makes it unlikely that the line hits a vertical edge, such as an edge of a wall from a map.
+"""
 
 
 def point_to_triangles(point: Array, corners: Array) -> Array:
@@ -57,7 +60,8 @@ def encloses_along_line(corners: Array, point: Vector) -> bool | None:
     """
     x, y, z = np.moveaxis(corners - point, 2, 0)
     x, y = x - LINE_TILT[0] * z, y - LINE_TILT[1] * z
-    # For each corner, twice the area of the line and the two other corners; all have one sign if the line crosses.
+    # Seen along the line, the line is a point. For each corner: twice the signed area of the triangle of this point
+    # and the two other corners. All three areas have one sign if the line crosses the triangle of the corners.
     areas = np.roll(x, -1, 1) * np.roll(y, -2, 1) - np.roll(x, -2, 1) * np.roll(y, -1, 1)
     is_crossed = (areas >= 0).all(axis=1) | (areas <= 0).all(axis=1)
     areas, z = areas[is_crossed], z[is_crossed]

@@ -19,7 +19,10 @@ class SpeedFilter:
         self._zones, self._mask, self.is_used = zones.speed, zones.masks.speed, True
 
     def limit(self, pose: Pose2, full_speed: float) -> float | None:
-        """Return the lowest limit in m/s at a pose; None without a limit. Masks can be percentages of `full_speed`."""
+        """Return the lowest limit in m/s at a pose; None without a limit.
+
+        The values of a mask can be percentages of `full_speed`.
+        """
         limits = [limit for polygon, limit in self._zones if distance_to_polygon(pose, polygon) == 0.0]
         masked = self._mask.at(pose, full_speed) if self._mask is not None else None
         return min(limits if masked is None else [*limits, masked], default=None)

@@ -26,7 +26,7 @@ HALF_DIAGONAL_STEP_M = STEP_M * math.sqrt(0.5)
 SAMPLING_MARGIN_M = 0.02
 """Additional clearance, because straight lines are checked only at single points."""
 MAX_GRID_POINTS = 4000
-"""Maximum number of grid points that a search visits."""
+"""Maximum number of grid points that a search may discover."""
 MOVES = [move for move in product((-1, 0, 1), repeat=2) if move != (0, 0)]
 """Steps to the eight neighbors of a grid point."""
 

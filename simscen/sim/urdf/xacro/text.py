@@ -78,7 +78,7 @@ class TextEvaluator:
                 owner.values[name] = value
                 return value
             case EvaluationMarker():
-                raise ExpansionError(f"the property {name!r} is defined by itself")
+                raise ExpansionError(f"the property {name!r} refers to itself")
             case Block():
                 raise KeyError(name)
             case found:
