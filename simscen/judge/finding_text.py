@@ -14,7 +14,7 @@ GOALS_REACHED = "goals_reached"
 MAX_TIMES_SHOWN = 5
 """Maximum number of times that are listed for a repeated disturbance."""
 _RELATIONS = {"≤ ": ("≤ ", "> "), "≥ ": ("≥ ", "< "), "< ": ("< ", "≥ "), "> ": ("> ", "≤ ")}
-"""Signs for "value sign limit", by the start of the limit: (sign if the limit holds, sign if it is violated)."""
+"""Signs between value and limit, by the sign at the start of the limit: (limit is met, limit is violated)."""
 
 
 def comparison(finding: Finding) -> str:
@@ -69,7 +69,7 @@ def disturbance_line(outcome: DisturbanceOutcome, tick_rate: int) -> str:
 
 
 def violations(verdict: Verdict) -> tuple[Finding, ...]:
-    """Return the failed, inconclusive, and invalid findings of a verdict, in order."""
+    """Return the findings of a verdict that did not pass: failed, inconclusive, and with an error, in order."""
     return tuple(finding for finding in verdict.findings if finding.status is not Status.PASS)
 
 

@@ -91,5 +91,6 @@ def _no_match_message(candidates: Sequence[LoadedScenario], keyword: str, tags: 
     unknown = [tag for tag in tags if tag not in known]
     if unknown:
         return f"no scenario has the tag {quoted(unknown[0])}; {suggestion(unknown[0], known) or 'there are no tags'}"
-    filters = " and ".join([*([f"-k {quoted(keyword)}"] if keyword.strip() else []), *(f"--tag {tag}" for tag in tags)])
+    tag_filter = " or ".join(f"--tag {tag}" for tag in tags)
+    filters = " and ".join(filter(None, (f"-k {quoted(keyword)}" if keyword.strip() else "", tag_filter)))
     return f"none of {len(candidates)} scenarios matches {filters}"

@@ -21,10 +21,10 @@ ESTIMATED_POSE_TOLERANCE_PER_M = 0.02
 NOISE_SIGMAS = 4.0
 """Additional tolerance, as a multiple of the standard deviation of the range noise."""
 MAX_NOISE_M = 0.3
-"""Maximum standard deviation of the range noise that increases the tolerance."""
+"""Upper bound of the standard deviation of the range noise from which the additional tolerance is computed."""
 MAD_TO_STD = 1.4826
 """Factor from the median absolute deviation to the standard deviation of a normal distribution."""
-MAX_INVALID_HIT_FRACTION, MIN_EXPECTED_HIT_FRACTION = 0.1, 0.3
+INVALID_SCAN_MAX_HIT_FRACTION, MIN_EXPECTED_HIT_FRACTION = 0.1, 0.3
 """Limits for a scan that is invalid because it has hardly any hit: maximum fraction of beams with a hit, and minimum
 fraction of beams for which a hit is expected."""
 MAX_SMOOTH_STEP_M = 0.1
@@ -67,7 +67,7 @@ class ComparedScans:
     def is_invalid(self) -> Mask:
         """Mask (n,) of scans with a wrong number of beams, or with hardly any hit where hits are expected."""
         hits, expected_hits = self.is_hit.mean(axis=1), np.isfinite(self.expected).mean(axis=1)
-        lacks_hits: Mask = (hits < MAX_INVALID_HIT_FRACTION) & (expected_hits > MIN_EXPECTED_HIT_FRACTION)
+        lacks_hits: Mask = (hits < INVALID_SCAN_MAX_HIT_FRACTION) & (expected_hits > MIN_EXPECTED_HIT_FRACTION)
         return self.scans.is_malformed | lacks_hits
 
     @cached_property

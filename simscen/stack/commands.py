@@ -15,7 +15,7 @@ class VelocitySmoother:
     """Limits velocity and acceleration of commands, like nav2_velocity_smoother with OPEN_LOOP feedback."""
 
     def __init__(self, spec: SmootherSpec, robot: RobotModel, period: float) -> None:
-        """Use the speed limits of `spec`, and the lower acceleration limits of `spec` and `robot`.
+        """Use the speed limits of `spec`, and the smaller of each acceleration limit of `spec` and `robot`.
 
         `period` is the controller period in s.
         """
@@ -76,7 +76,7 @@ class CommandPipeline:
     def __init__(
         self, smoother: VelocitySmoother, monitor: CollisionMonitor, period: int, latency: tuple[int, int]
     ) -> None:
-        """Take the components, and in ticks the controller `period` and the `latency` of (controller, monitor)."""
+        """`period` of the controller and `latency` of (controller, monitor) are in ticks."""
         self._smoother, self._monitor, self._period = smoother, monitor, period
         self._requested = LatencyQueue[tuple[Twist, int]](latency[0])
         """Commands that the controller computes, each with the number of periods since the previous command."""

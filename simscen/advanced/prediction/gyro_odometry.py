@@ -1,4 +1,4 @@
-"""Odometry in which tracked obstacles are located: the distance of the wheels with the heading of the gyroscope.
+"""Odometry in which obstacles are tracked: driven distance from the wheels, heading from the gyroscope.
 
 With the heading of skidding wheels, everything would seem to rotate around the robot.
 """
@@ -17,7 +17,7 @@ MAX_PENDING = 10_000
 
 
 class GyroOdometry:
-    """Odometry with the distance of the wheels and, if possible, the heading of the gyroscope.
+    """Odometry with the driven distance of the wheels, and the heading of the gyroscope, or else of the wheels.
 
     Readings are integrated when a pose is requested, to save time.
     """

@@ -56,7 +56,7 @@ def translate_planner_server(parameters: Parameters) -> Iterator[Translation]:
 def _translate_checker_class(parameters: Parameters, kind: str, chosen: str) -> Iterator[Translation]:
     """Translate the class of the progress checker or goal checker with the name `chosen`.
 
-    A class that simscen does not have results in a note. The simple classes need no translation, because their
+    Yields a note if simscen does not have the class. The simple classes need no translation, because their
     parameters have the same names in simscen.
     """
     name = f"{chosen}.plugin"

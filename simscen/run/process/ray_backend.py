@@ -41,8 +41,8 @@ MAX_UNREAD_UPDATES = 64
 class _Runner:
     """Handle of the Ray actor of the class NodeRunner on one node.
 
-    `call` is the pending remote call of the actor: `software` at first; `run` if `is_ready`, but None while the queue
-    is empty.
+    `call` is the pending remote call of a method of the actor: `software` until `is_ready`, then `run`. It is None
+    while `is_ready` and no run is queued.
     """
 
     name: str

@@ -59,7 +59,8 @@ def crop_costmap(costmap: CostmapView, start: Pose2, goal: Pose2, margin: float)
 def _min_length_outside(costmap: CostmapView, window: CostmapView, start: Pose2, goal: Pose2) -> float:
     """Return the minimum length in m of a path that leaves a window of the costmap; inf if no path can leave it.
 
-    The minimum is the distance from the start to the goal, mirrored at the nearest side of the window.
+    For each side of the window inside the costmap, the shortest path touches the side: its length is the distance from
+    the start to the mirror image of the goal at the side.
     """
     shortest = math.inf
     for axis, start_coordinate, goal_coordinate, lateral in (
